@@ -85,7 +85,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     Ok(exit_code(&report))
 }
 
-/// Page of a demo, and a browser that shows it.
+/// Serves the page of a demo, and opens a browser that shows it.
 fn demo_page(args: &Demo, scene: &Scene, log: &Path, dive: &Dive, in_lines: bool) -> Option<Served> {
     let of = Of {
         vehicle: &scene.vehicle,
@@ -240,7 +240,7 @@ fn files_of_player(player: &Player) -> Vec<PathBuf> {
     player.files().iter().map(|file| file.path.clone()).collect()
 }
 
-/// Page of a replay.
+/// Serves the page of a replay.
 fn replay_page(
     args: &Replay,
     vehicle: &VehicleConfig,

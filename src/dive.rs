@@ -32,11 +32,13 @@ use crate::progress::Progress;
 use crate::recordings::Recordings;
 use crate::watch::Watch;
 
-/// Capacity of the queue of notices to the terminal. A tick of 20 ms has a handful. A slot takes some 400
-/// bytes, allocated at arming.
+/// Capacity of the queue of notices to the terminal.
+///
+/// A tick of 20 ms has only a few notices. A slot takes about 400 bytes, allocated at arming.
 const NOTICES: usize = 1 << 10;
 
-/// Keys of a log's metadata: one moment on its clock and in UTC, nanoseconds.
+/// Metadata keys of a log. The two values state the same moment on the log's clock and in UTC, in
+/// nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
 /// Callback after every tick.
@@ -54,24 +56,24 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// Whether the loop was informed of a failed recording.
+    /// Whether the loop has been told that a recording fails.
     fails: bool,
 }
 
-/// A log to write.
+/// A log to be written.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Recording<'a> {
-    /// Paths. Several paths are separate recordings.
+    /// Paths. Each path is a separate recording.
     pub(crate) paths: &'a [PathBuf],
     pub(crate) clock: Clock,
-    /// Size or duration of its parts; `None` for a single file.
+    /// Size or duration of a part; `None` for a recording in a single file.
     pub(crate) rotate: Option<Every>,
     /// Name of the scene, for a simulation.
     pub(crate) scene: Option<&'a str>,
 }
 
 impl<'a> Recording<'a> {
-    /// Log of a simulated dive.
+    /// Recording of a simulated dive.
     pub(crate) fn simulated(path: &'a PathBuf, scene: &'a str) -> Self {
         Self { paths: std::slice::from_ref(path), clock: Clock::Theirs, rotate: None, scene: Some(scene) }
     }
@@ -96,7 +98,7 @@ pub(crate) struct Assembly<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    /// A vehicle and the text of its file, with the navigation that the file states.
+    /// Assembles a vehicle with the navigation that its file states. `text` is the text of the file.
     pub(crate) fn of(vehicle: &'a VehicleConfig, text: &'a str) -> Self {
         Self { vehicle, text, recording: None, keeps_results: false, navigation: None }
     }
@@ -106,19 +108,19 @@ impl<'a> Assembly<'a> {
         Self { recording, ..self }
     }
 
-    /// Keeps results for each tick, if the dive is followed or compared.
+    /// Keeps the results of each tick, if a follower or a comparison needs them.
     pub(crate) fn kept(self, keeps_results: bool) -> Self {
         Self { keeps_results, ..self }
     }
 
-    /// Uses a navigation other than the vehicle file's.
+    /// Uses another navigation than that of the vehicle file.
     pub(crate) fn navigated(self, navigation: Box<dyn Navigation>) -> Self {
         Self { navigation: Some(navigation), ..self }
     }
 
     /// Starts the recorders, and arms the loop.
     ///
-    /// Errors: too little memory; a device or plugin that doesn't fit; a recording that can't be created.
+    /// Errors: there is too little memory, a device or plugin doesn't fit, or a recording can't be created.
     pub(crate) fn assemble(self) -> Result<Dive, Failure> {
         let vehicle = self.vehicle;
         memory::check_room(ring_bytes(vehicle))?;
@@ -178,7 +180,7 @@ fn ring_bytes(vehicle: &VehicleConfig) -> usize {
     vehicle.sensors.iter().map(|sensor| sensor.specification().ring_bytes).sum()
 }
 
-/// The vehicle's sensors, and the queue of notices to the terminal.
+/// The app with the vehicle's sensors, and the queue of notices to the terminal.
 fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
@@ -214,7 +216,7 @@ pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
     }
 }
 
-/// Stores the UTC time of the timestamps' clock.
+/// Stores the UTC time that corresponds to the clock of the timestamps.
 fn anchor(header: &mut LogHeader) {
     let (monotonic, utc) = headrace_ports::clock_anchor();
     let [of_clock, of_utc] = CLOCK_ANCHOR.map(str::to_owned);
@@ -255,7 +257,7 @@ pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: boo
     }
 }
 
-/// Numbers of the sensors that send echoes.
+/// Numbers of the sensors that are sonars.
 fn sonars(vehicle: &VehicleConfig) -> Vec<u16> {
     let is_sonar = |sense: Sense| matches!(sense, Sense::Head | Sense::Echosounder);
     let numbered = (0..).zip(&vehicle.sensors);
@@ -263,7 +265,7 @@ fn sonars(vehicle: &VehicleConfig) -> Vec<u16> {
 }
 
 impl Dive {
-    /// Accepts commands of an operator from now on; for live dives only, not replays.
+    /// Accepts an operator's commands from now on. This is for live dives, not for replays.
     pub(crate) fn operated(mut self, clock: Clock) -> Self {
         let clock: Option<Arc<dyn Fn() -> MonoNs + Send + Sync>> = match clock {
             Clock::Ours => Some(Arc::new(headrace_ports::now)),
@@ -274,13 +276,13 @@ impl Dive {
         self
     }
 
-    /// Port that takes commands for the loop from any thread; `None` for a dive without an operator.
+    /// Port that accepts commands for the loop from any thread; `None` for a dive without an operator.
     pub(crate) fn console(&self) -> Option<ConsolePort> {
         self.operator.as_ref().map(|operator| operator.port.clone())
     }
 
-    /// Runs the loop until the feed ends; returns the report. `beside` is called after every tick and at the
-    /// end.
+    /// Runs the loop until the feed ends, and returns the report. `beside` is called after every tick and at
+    /// the end.
     pub(crate) fn run(
         self,
         feed: &mut dyn PacketSource,
@@ -292,7 +294,8 @@ impl Dive {
         self.run_driven(span, watch, beside, &mut |dive, after_tick| drive(dive, feed, pace, after_tick))
     }
 
-    /// Runs the loop on up to `threads` threads; on one if a speed is set.
+    /// Runs the loop on up to `threads` threads, and returns the report. If a playback speed is set, one
+    /// thread is used.
     pub(crate) fn run_on(
         self,
         threads: usize,
@@ -335,7 +338,7 @@ impl Dive {
         drop(progress);
         drop(phase);
         if let Err(error @ DriveError::Panicked { .. }) = driven {
-            // Parts of the loop are missing now.
+            // After a panic, parts of the loop are missing, so there is no report.
             return Err(error.into());
         }
         let report = self.end(watch, beside);
@@ -343,7 +346,7 @@ impl Dive {
         Ok(report)
     }
 
-    /// Lets `direct` run the loop; returns the report.
+    /// Lets `direct` run the loop, and returns the report.
     pub(crate) fn play(
         mut self,
         watch: &mut Watch,
@@ -358,7 +361,8 @@ impl Dive {
         Ok(report)
     }
 
-    /// Runs the loop on the ports until `ended` returns true; returns the report. `beside` is called after every tick.
+    /// Runs the loop on the ports until `ended` returns true, and returns the report. `beside` is called
+    /// after every tick.
     pub(crate) fn run_live(
         mut self,
         supervisor: Supervisor,
@@ -397,26 +401,26 @@ impl Dive {
         report
     }
 
-    /// Inputs of the recorders for traffic on devices' lines outside the loop.
+    /// Ports of the recorders for traffic on devices' lines outside the loop.
     pub(crate) fn line_ports(&self) -> Vec<LinePort> {
         self.recordings.line_ports()
     }
 
-    /// Inputs of the recorders for recordings of voice notes.
+    /// Ports of the recorders for recordings of voice notes.
     pub(crate) fn voice_ports(&self) -> Vec<VoicePort> {
         self.recordings.voice_ports()
     }
 
-    /// Ends the dive; returns the report.
+    /// Ends the dive, and returns the report.
     fn end(mut self, watch: &mut Watch, beside: &mut dyn FnMut(&Loop)) -> Report {
         let _phase = Phase::start("report");
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
         watch.end(&self.armed);
         beside(&self.armed);
-        // Records the last judgements, too.
+        // This tick records the last judgements.
         let now = self.armed.now();
         self.armed.tick(now);
-        // The report of a long dive takes as much memory as its samples, which are no longer needed.
+        // The samples are no longer needed, and the report of a long dive takes as much memory.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         let recordings = core::mem::take(&mut self.recordings);
@@ -427,7 +431,8 @@ impl Dive {
 }
 
 impl Operator {
-    /// Informs the loop whether data is being recorded, so that later or other recordings contain it.
+    /// Tells the loop whether a recording fails. Other recordings, and later parts of this one, thus contain
+    /// the fact.
     fn recording(&mut self, fails: bool) {
         if core::mem::replace(&mut self.fails, fails) == fails {
             return;
@@ -438,7 +443,7 @@ impl Operator {
     }
 }
 
-/// Reports events of the recordings, also to the loop.
+/// Reports events of the recordings on the screens and to the loop.
 fn tell_recordings(
     recordings: &mut Recordings,
     watch: &mut Watch,

@@ -20,7 +20,7 @@ use crate::logging::complain;
 use crate::output::say;
 use crate::outputs::{self, Claims, Kind, REHEARSAL};
 
-/// Longest wait for a host, ns. It bounds the delay of a measurement.
+/// Longest wait for bytes from a host, ns. It limits the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
 
 /// `headrace emulate`.
@@ -65,12 +65,13 @@ fn claim(scene: &Scene, args: &Emulate, vehicle_file: &Path, beside: &Beside) ->
     Ok(())
 }
 
-/// Whether a file equals that of an earlier rehearsal, which may be overwritten.
+/// Whether a file equals one that an earlier rehearsal has written. Such a file may be overwritten.
 fn holds(path: &Path, content: &str) -> bool {
     std::fs::read(path).is_ok_and(|there| there == content.as_bytes())
 }
 
-/// Opens a port for each sensor, on its `connect`'s carrier, or UDP if this machine lacks it.
+/// Opens a port for each sensor. The port's carrier is that of `connect`, or UDP if this machine doesn't have
+/// that carrier.
 fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<EmulatedPort>, Failure> {
     let mut stands = Vec::new();
     for ((id, asked), device) in connections(&scene.vehicle).into_iter().zip(&scene.vehicle.sensors) {
@@ -113,8 +114,9 @@ fn write_vehicle(scene: &Scene, stands: &[EmulatedPort], folder: &Path, file: &P
     files::write(file, text.as_bytes())
 }
 
-/// The scene's vehicle file with a `connect` in each sensor's table. Simulations don't need it, so it may be
-/// missing.
+/// The scene's vehicle file, with a `connect` in each sensor's table.
+///
+/// A file for simulations may have none.
 fn with_connects(scene: &Scene) -> String {
     let missing: Vec<String> = scene
         .vehicle

@@ -1,4 +1,4 @@
-//! Comparison of a report with a golden one.
+//! Compares a report with a golden one.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::logging::complain;
 /// Maximum number of differences listed.
 const SHOWN: usize = 20;
 
-/// A golden report, without the log's name and hash and the history of ports.
+/// A golden report. The log's name and hash, and the history of ports, are left out.
 pub(crate) struct Golden {
     expected: Value,
     allowed: Allowed,
@@ -21,7 +21,7 @@ pub(crate) struct Golden {
 impl Golden {
     /// Reads a golden report.
     ///
-    /// Errors: it can't be read, or isn't a report.
+    /// Errors: the file can't be read, or isn't a report.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let wrong = |why: String| {
             Failure::Usage(format!("reading {}: {why}; expected a report of headrace", path.display()))
@@ -33,14 +33,18 @@ impl Golden {
         Ok(Self { expected, allowed })
     }
 
-    /// Whether a report differs by more than the tolerances, apart from the log and the ports. Lists the
-    /// differences on stderr.
+    /// Whether a report differs from the golden one by more than the tolerances. Lists the differences on
+    /// stderr.
+    ///
+    /// The log and the ports aren't compared.
     pub(crate) fn differs(&self, report: &Report) -> Result<bool, Failure> {
         Ok(tell(&self.expected, &without_log(report)?, &self.allowed))
     }
 }
 
-/// Replaces the golden report, without the log's name and hash, keeping its tolerances. Lists the differences on stderr.
+/// Replaces the golden report, keeps its tolerances, and lists the differences on stderr.
+///
+/// The new report has no name and hash of the log.
 pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
     let mut got = without_log(report)?;
     let old: Option<Value> =
@@ -55,7 +59,7 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
             if let (Some(stated), Some(report)) = (stated, got.as_object_mut()) {
                 report.insert(TOLERANCES.to_owned(), stated);
             }
-            // A golden report of an earlier version, with keys missing, is completed.
+            // Keys missing in a golden report of an earlier version are added.
             let lacks = |key: &String| before.get(key).is_none();
             if !differs && !got.as_object().is_some_and(|got| got.keys().any(lacks)) {
                 complain(&format!("{}: unchanged", golden.display()));
@@ -69,10 +73,10 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
     files::write(golden, text.as_bytes())
 }
 
-/// Key of a golden report for its tolerances, by path.
+/// Key of the tolerances in a golden report.
 ///
-/// In a path, `*` matches any one name or index. The value is the largest difference of two numbers, or
-/// `"any"`.
+/// The tolerances are listed by path. In a path, `*` matches any name or index. The value is the largest
+/// allowed difference of two numbers, or `"any"`.
 const TOLERANCES: &str = "tolerances";
 
 /// Tolerances by path; `None` allows any difference.
@@ -80,7 +84,7 @@ const TOLERANCES: &str = "tolerances";
 struct Allowed(Vec<(Vec<String>, Option<f64>)>);
 
 impl Allowed {
-    /// Removes the tolerances from a golden report.
+    /// Takes the tolerances out of a golden report.
     fn take(golden: &mut Value) -> Result<Self, String> {
         let stated = golden.as_object_mut().and_then(|golden| golden.remove(TOLERANCES));
         let Some(stated) = stated else { return Ok(Self::default()) };
@@ -103,7 +107,7 @@ impl Allowed {
     fn covers(&self, path: &str, expected: &Value, got: &Value) -> bool {
         let names: Vec<&str> = path.split('/').collect();
         let fits = |wanted: &[String]| {
-            // "any" covers everything below its path.
+            // The tolerance "any" covers everything below its path.
             wanted.len() <= names.len()
                 && wanted.iter().zip(&names).all(|(wanted, name)| {
                     wanted == "*" || wanted == name || name.split('[').next() == Some(wanted)
@@ -123,7 +127,7 @@ fn without_log(report: &Report) -> Result<Value, Failure> {
     Ok(value)
 }
 
-/// Removes log and ports: a replay has no ports.
+/// Removes the log and the ports, since a replay has no ports.
 fn drop_log(report: &mut Value) {
     if let Some(object) = report.as_object_mut() {
         object.insert("log".to_owned(), Value::Null);
@@ -134,7 +138,7 @@ fn drop_log(report: &mut Value) {
     }
 }
 
-/// Lists the differences of two reports; returns whether there are any.
+/// Lists the differences of two reports. Returns whether there are any.
 fn tell(expected: &Value, got: &Value, allowed: &Allowed) -> bool {
     let mut differences = Vec::new();
     compare("", expected, got, allowed, &mut differences);
@@ -148,7 +152,8 @@ fn tell(expected: &Value, got: &Value, allowed: &Allowed) -> bool {
     !differences.is_empty()
 }
 
-/// Order of the list: the report as a whole, sections' verdicts, the rest of the sections, everything else.
+/// Order of the list: the report as a whole, the verdicts of sections, other differences of sections, and
+/// everything else.
 fn rank(difference: &str) -> u8 {
     let path = difference.split(": ").next().unwrap_or_default();
     match path {
@@ -159,7 +164,7 @@ fn rank(difference: &str) -> u8 {
     }
 }
 
-/// Name of a list's entry: its index, or for a section its bounds.
+/// Name of an entry in a list. It is the entry's index, or the bounds of a section.
 fn entry_name(index: usize, entry: &Value) -> String {
     let metres = |key: &str| entry.get(key).and_then(Value::as_f64);
     match (metres("start_m"), metres("end_m")) {

@@ -1,4 +1,4 @@
-//! `headrace simulate --explain`: lists the simulated effects, their reasons, and their worth.
+//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and their worth.
 
 use headrace_replay::effect_influence::{
     EffectInfluence, HOLE_LIMIT_M, LeftOut, Mean, PASSED_LIMIT, measure,
@@ -12,10 +12,10 @@ use crate::output::{append, deliver, show};
 use crate::phase::Phase;
 use crate::progress::Progress;
 
-/// Width of a column with a figure and its interval.
+/// Width of a column that has a figure and the figure's interval.
 const COLUMN: usize = 20;
 
-/// Measures the worth of a scene's effects. The scene has been read with several seeds.
+/// Measures the worth of a scene's effects. `scenes` is the scene, read with several seeds.
 pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure> {
     let _phase = Phase::start("worth");
     let mut progress = Progress::start();
@@ -24,8 +24,9 @@ pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure>
     })?)
 }
 
-/// Lists a scene's systems, components and random streams, the used and unused effects, and their worth if
-/// measured.
+/// Lists a scene's systems, components and random streams, and the used and unused effects.
+///
+/// Adds the worth of the effects if it was measured.
 pub(crate) fn explain(scene: &Scene, worth: Option<&EffectInfluence>, as_json: bool) -> Result<u8, Failure> {
     let simulation = Simulation::new(scene)?;
     if as_json {
@@ -107,7 +108,8 @@ fn worth_in_json(worth: &EffectInfluence) -> Value {
     })
 }
 
-/// Text on the worth of the effects: the cheapest sufficient set, then each effect, the most expensive first.
+/// Text on the worth of the effects: first the cheapest sufficient set, then each effect, the most expensive
+/// first.
 fn worth_in_words(worth: &EffectInfluence) -> String {
     let kept =
         worth.each.iter().flat_map(|out| &out.effects).filter(|name| !worth.spared.effects.contains(name));
@@ -151,7 +153,7 @@ fn worth_in_words(worth: &EffectInfluence) -> String {
     text
 }
 
-/// A mean with its interval, times `scale`.
+/// A mean with its interval, both multiplied by `scale`.
 fn plus_minus(mean: &Mean, scale: f64, digits: usize) -> String {
     format!("{:.digits$} +- {:.digits$}", mean.mean * scale, mean.half * scale)
 }
@@ -167,7 +169,7 @@ fn called_in_words(called: &[Called]) -> String {
     text
 }
 
-/// Callers of an effect: the first one if many sensors call for it.
+/// Callers of an effect. If there are many, only the first is named.
 fn by(callers: &[String]) -> String {
     const SHOWN: usize = 3;
     let shown = callers.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("; ");

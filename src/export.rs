@@ -25,7 +25,7 @@ use crate::report_output::{exit_code, note_losses};
 use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
-/// Maximum total size of recordings in a page, bytes: two hours.
+/// Maximum total size of the recordings in a page, bytes. It is enough for two hours.
 const MOST_VOICE_BYTES: usize = 24 << 20;
 
 /// `headrace export`.
@@ -70,13 +70,13 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     Ok(exit_code(&report))
 }
 
-/// Recordings of a dive's voice notes that fit into a page, and the number left out.
+/// Recordings of the dive's voice notes that fit into a page, and the number of recordings left out.
 fn voices(files: &[PathBuf], report: &Report) -> Result<(Vec<Voice>, u64), Failure> {
     let (mut voices, mut bytes, mut left_out): (Vec<Voice>, _, _) = (Vec::new(), 0, 0);
-    // Most dives have no voice notes, and then the log needn't be read again.
+    // Without voice notes, as in most dives, the log needn't be read again.
     if report.notes.iter().any(|note| note.voice.is_some()) {
         each_voice(files, |voice| {
-            // A recording is sent twice if the first answer was lost.
+            // The page sends a recording again if it didn't receive the first answer.
             if voices.iter().any(|other| other.id == voice.id) {
                 return Ok::<_, Failure>(());
             }

@@ -1,5 +1,5 @@
-//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs no SQL engine
-//! and no oracles.
+//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs neither an SQL
+//! engine nor oracles.
 
 use std::ffi::OsStr;
 use std::io::ErrorKind;
@@ -9,7 +9,7 @@ use std::process::Command;
 use crate::cli::ExternalArguments;
 use crate::failure::{self, Failure};
 
-/// A program of `lab/`, and its package.
+/// A program of `lab/`, and the package that contains it.
 pub(crate) struct Program {
     name: &'static str,
     package: &'static str,
@@ -20,11 +20,12 @@ pub(crate) const CAMPAIGN: Program = Program { name: "headrace-campaign", packag
 /// `headrace cost`.
 pub(crate) const COST: Program = Program { name: "headrace-cost", package: "headrace_cost" };
 
-/// Runs a program of `lab/` with these arguments after `first`; returns its exit code.
+/// Runs a program of `lab/` with `arguments` after `first`, and returns its exit code.
 ///
-/// It searches next to this program, where `lab/` of the same clone builds it, and on PATH.
+/// The program is searched for next to this one, where `lab/` of the same clone builds it, and then on PATH.
 ///
-/// Errors: there is no such program (the text has the command that builds it), or it can't be started.
+/// Errors: there is no such program, or it can't be started. If there is none, the text has the command that
+/// builds it.
 pub(crate) fn run(program: &Program, first: Option<&str>, args: &ExternalArguments) -> Result<u8, Failure> {
     let Program { name, package } = program;
     let own = std::env::current_exe().ok();
@@ -34,7 +35,7 @@ pub(crate) fn run(program: &Program, first: Option<&str>, args: &ExternalArgumen
     let found = places.into_iter().flatten().find(|path| path.is_file());
     let arguments = first.map(OsStr::new).into_iter().chain(args.arguments.iter().map(OsStr::new));
     match Command::new(found.unwrap_or_else(|| PathBuf::from(name))).args(arguments).status() {
-        // A signal ended it.
+        // A signal ended the program.
         Ok(status) => Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(failure::FAILED)),
         Err(error) if error.kind() == ErrorKind::NotFound => Err(Failure::Usage(format!(
             "{name} is neither beside this program, nor in lab/target/release, nor on PATH; build it with: \

@@ -19,11 +19,11 @@ use headrace_simulator::SceneError;
 
 /// Exit code: success, with all data.
 pub(crate) const OK: u8 = 0;
-/// Exit code: failed, or the result differs from the expected one.
+/// Exit code: the command failed, or the result differs from the expected one.
 pub(crate) const FAILED: u8 = 1;
 /// Exit code: a file or an argument is wrong.
 pub(crate) const USAGE: u8 = 2;
-/// Exit code: finished, but data was lost.
+/// Exit code: the command finished, but data was lost.
 pub(crate) const DATA_LOST: u8 = 3;
 /// Exit code: the replay differs from the dive.
 pub(crate) const DIVERGED: u8 = 4;
@@ -97,7 +97,7 @@ impl Failure {
         }
     }
 
-    /// Error for a log that is being written to `path`, which the text names.
+    /// Converts an error from writing a log to `path`. The text names the path.
     pub(crate) fn writing(path: &Path) -> impl Fn(LogError) -> Self {
         move |error| match error {
             LogError::Write { source, .. } => Self::Write { path: path.to_owned(), source },
@@ -118,14 +118,14 @@ impl Failure {
             | Self::Routing(_)
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
             Self::Log(error) if is_wrong_file(error) => USAGE,
-            // Errors of the vehicle file, which doesn't contain the order of systems.
+            // The vehicle file is wrong, except if the order of systems is: it doesn't come from the file.
             Self::Plugin(error) if !matches!(error, PluginError::Schedule { .. }) => USAGE,
             _ => FAILED,
         }
     }
 }
 
-/// Whether the wrong or an unwritable file was named, and not a medium failed.
+/// Whether the error is a wrong or unwritable file, rather than a failed medium.
 fn is_wrong_file(error: &LogError) -> bool {
     matches!(
         error,

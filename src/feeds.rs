@@ -8,7 +8,7 @@ use headrace_monitor::ring::{Port, RingError};
 use headrace_replay::drive::{Coming, PacketSource};
 use headrace_replay::log::LogError;
 
-/// A feed that ends when the flag is set.
+/// A feed that ends when its flag is set.
 pub(crate) struct Interruptible<'a> {
     pub(crate) feed: &'a mut dyn PacketSource,
     pub(crate) interrupted: &'a AtomicBool,
@@ -52,7 +52,7 @@ impl PacketSource for Followed<'_> {
     }
 }
 
-/// Share of a span of time that has passed, 0 to 1; `None` if there is no span.
+/// Share of a time span that has passed, 0 to 1; `None` without a span.
 pub(crate) fn share(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> Option<f64> {
     let (from, to) = span?;
     let whole_s = to.since(from).as_secs_f64();

@@ -1,4 +1,4 @@
-//! Files: reading, writing, built-in and attached ones.
+//! Reads and writes files, and loads built-in and attached ones.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -17,14 +17,14 @@ pub(crate) const DEMO_SCENE: (&str, &str) =
 const DEMO_VEHICLE: (&str, &str) =
     ("../vehicles/vita2-4.toml", include_str!("../deploy/vehicles/vita2-4.toml"));
 
-/// First of the logs named on the command line. Messages name it for all of them.
+/// First of the logs named on the command line. Messages about several logs name only this one.
 pub(crate) fn first_named(logs: &[PathBuf]) -> &Path {
     logs.first().map_or(Path::new(""), PathBuf::as_path)
 }
 
-/// Maximum size of a vehicle file, scene, mapping or text file that one of these names, bytes.
+/// Maximum size of a vehicle file, scene or mapping file, and of a text file named in one of them, bytes.
 const TEXT_BYTES: u64 = 16 << 20;
-/// Maximum size of a mesh or trajectory that a scene names, and of a report, bytes.
+/// Maximum size of a report, and of a mesh or trajectory that a scene names, bytes.
 const DATA_BYTES: u64 = 256 << 20;
 
 /// Reads a hand-written text file.
@@ -56,7 +56,7 @@ pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
     atomic_file::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
 }
 
-/// Writes a report as JSON, atomically and without holding all of it in memory.
+/// Writes a report as JSON, atomically, without holding the whole text in memory.
 ///
 /// The JSON of a long dive would take more memory than the dive.
 pub(crate) fn write_json(path: &Path, report: &Report) -> Result<(), Failure> {
@@ -82,7 +82,7 @@ pub(crate) fn bytes_beside(file: &Path) -> impl Fn(&str) -> Result<Vec<u8>, Stri
     move |name| beside.load(name)
 }
 
-/// Loads the files that a file refers to, and remembers their paths.
+/// Loads the files that a file refers to, and keeps a list of their paths.
 pub(crate) struct Beside {
     folder: PathBuf,
     read: RefCell<Vec<PathBuf>>,
@@ -94,7 +94,7 @@ impl Beside {
         Self { folder, read: RefCell::new(vec![file.to_owned()]) }
     }
 
-    /// Loads one of these files.
+    /// Loads one of the referenced files.
     pub(crate) fn load(&self, name: &str) -> Result<Vec<u8>, String> {
         let path = self.folder.join(name);
         self.read.borrow_mut().push(path.clone());
@@ -102,7 +102,7 @@ impl Beside {
             .map_err(|error| format!("can't be read at {}: {error}", path.display()))
     }
 
-    /// The file, and those referenced files that have been loaded.
+    /// The file itself, and the referenced files that have been loaded.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         self.read.borrow().clone()
     }

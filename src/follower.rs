@@ -1,4 +1,4 @@
-//! Interface of followers of a dive besides the terminal: a page, another program.
+//! Interface of followers of a dive besides the terminal, such as a page or another program.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Notice;
@@ -8,16 +8,16 @@ use headrace_replay::log::RecordingEvent;
 
 use crate::recording_state::RecordingState;
 
-/// Follows a dive. It is called on the loop's thread between ticks.
+/// Follows a dive. The methods are called on the loop's thread between ticks.
 ///
-/// It takes values from the loop and hands them to a thread of its own. It never waits, except in a replay,
-/// which may wait for it.
+/// A follower takes values from the loop and hands them to a thread of its own. In a live dive a follower
+/// never waits; a replay may wait for its followers.
 pub(crate) trait Follower {
-    /// A result of the last tick.
+    /// Called for each result of the last tick.
     fn notice(&mut self, _notice: &Notice, _dive: &Loop) {}
     /// Called after every tick, even without packets.
     fn tick(&mut self, dive: &Loop);
-    /// Called after a tick during a jump, whose notices aren't shown.
+    /// Called after a tick that belongs to a jump. The notices of such a tick aren't shown.
     fn skipped(&mut self, _dive: &Loop) {}
     /// Called when a replay pauses or resumes, or its speed changes.
     fn mode(&mut self, _paused: bool, _speed: Option<f64>) {}
@@ -25,11 +25,11 @@ pub(crate) trait Follower {
     fn sensor(&mut self, _id: &str, _status: &Status) {}
     /// Called for an event of a recording.
     fn recording(&mut self, _event: &RecordingEvent, _at: MonoNs) {}
-    /// Called with the state of the recordings to show from now on.
+    /// Called with the state of the recordings that is to be shown from now on.
     fn recorded(&mut self, _state: &RecordingState) {}
-    /// Called when a replay has paused, jumped or ended at `time` after its beginning. The loop's state may
-    /// differ.
+    /// Called when a replay has paused, jumped or ended at `time` after its beginning. The state of the loop
+    /// may be that of another time.
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
-    /// Called when the dive has ended, and all is judged.
+    /// Called when the dive has ended and all sections are judged.
     fn end(&mut self, dive: &Loop);
 }

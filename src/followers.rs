@@ -17,12 +17,12 @@ use crate::watch::{Show, Watch};
 /// Requested followers.
 pub(crate) struct Followers {
     tui: bool,
-    /// Address and system id.
+    /// Address to send to, and system id of the vehicle.
     mavlink_out: Option<(String, u8)>,
     foxglove: Option<SocketAddr>,
 }
 
-/// The dive for the followers.
+/// Information about the dive that followers need.
 pub(crate) struct Joining<'a> {
     vehicle: &'a VehicleConfig,
     mode: Mode,
@@ -34,13 +34,13 @@ pub(crate) struct Joining<'a> {
 }
 
 impl<'a> Joining<'a> {
-    /// A dive of a vehicle, which the flag ends.
+    /// A dive of a vehicle. The flag `interrupted` ends it.
     pub(crate) fn new(vehicle: &'a VehicleConfig, mode: Mode, interrupted: &Arc<AtomicBool>) -> Self {
         let interrupted = Arc::clone(interrupted);
         Self { vehicle, mode, interrupted, first: None, console: None, span: None }
     }
 
-    /// Accepts an operator's commands; `None` for a recorded dive.
+    /// Accepts an operator's commands, unless `console` is `None` because the dive is recorded.
     pub(crate) fn operated(self, console: Option<ConsolePort>) -> Self {
         Self { console, ..self }
     }
@@ -50,16 +50,16 @@ impl<'a> Joining<'a> {
         Self { span, ..self }
     }
 
-    /// Sets the line shown before anything else.
+    /// Sets the line that is shown before anything else.
     pub(crate) fn saying(self, first: String) -> Self {
         Self { first: Some(first), ..self }
     }
 }
 
 impl Followers {
-    /// Creates the requested followers. Call it before signals are handled.
+    /// Creates the requested followers. Call this function before signals are handled.
     ///
-    /// Errors: a follower isn't available here.
+    /// Errors: a follower isn't available in this program or terminal.
     pub(crate) fn of(asked: &Following) -> Result<Self, Failure> {
         if asked.foxglove.is_some() && !cfg!(feature = "foxglove") {
             let why = "--foxglove: this program was built without it; cargo build --features foxglove";
@@ -72,12 +72,12 @@ impl Followers {
         Ok(Self { tui: asked.tui, mavlink_out, foxglove: asked.foxglove })
     }
 
-    /// Display of the dive on stdout; `otherwise` is the default.
+    /// Kind of display on stdout. `otherwise` applies if no follower uses the terminal.
     pub(crate) fn show(&self, otherwise: Show) -> Show {
         if self.tui { Show::Followers } else { otherwise }
     }
 
-    /// Adds the followers.
+    /// Starts the followers, and adds them to `watch`.
     ///
     /// Errors: a follower can't be started.
     pub(crate) fn join(self, mut watch: Watch, joining: Joining<'_>) -> Result<Watch, Failure> {
@@ -116,6 +116,6 @@ fn foxglove(watch: Watch, at: SocketAddr, joining: &Joining<'_>) -> Result<Watch
 #[cfg(not(feature = "foxglove"))]
 #[expect(clippy::unnecessary_wraps, reason = "with the feature it may fail")]
 fn foxglove(watch: Watch, _: SocketAddr, _: &Joining<'_>) -> Result<Watch, Failure> {
-    // This was refused earlier.
+    // A program without the feature has refused the option earlier.
     Ok(watch)
 }

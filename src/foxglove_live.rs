@@ -26,9 +26,10 @@ use headrace_replay::view::{Site, View};
 use crate::failure::Failure;
 use crate::follower::Follower;
 
-/// Number of ticks whose results may wait: some ten seconds at 50 ticks a second.
+/// Maximum number of ticks whose results are waiting. It corresponds to about ten seconds at 50 ticks a
+/// second.
 const WAITING: usize = 512;
-/// Time for the server to close its connections.
+/// Time that the server has to close its connections.
 const ENDS_WITHIN: Duration = Duration::from_millis(500);
 /// Interval at which an interruption is checked.
 const WAIT: Duration = Duration::from_millis(200);
@@ -39,12 +40,12 @@ pub(crate) struct Controlled {
     /// The log's first and last time.
     pub(crate) span: (MonoNs, MonoNs),
     pub(crate) speed: Option<f64>,
-    /// Set by Ctrl-C.
+    /// Flag that Ctrl-C sets.
     pub(crate) interrupted: Arc<AtomicBool>,
 }
 
 enum Message {
-    /// A tick's results: channel and message, and the tick's time.
+    /// Time of a tick, and its results as channel and message.
     Results(MonoNs, Vec<(u16, Vec<u8>)>),
     /// A replay has paused, jumped, or ended.
     Stopped(MonoNs, bool),
@@ -59,9 +60,9 @@ pub(crate) struct Foxglove {
 }
 
 impl Foxglove {
-    /// Starts serving at an address of this machine.
+    /// Starts to serve at an address of this machine.
     ///
-    /// Errors: the address belongs to another machine, or is taken; a thread can't be started.
+    /// Errors: the address belongs to another machine or is taken, or a thread can't be started.
     pub(crate) fn start(
         at: SocketAddr,
         vehicle: &str,
@@ -112,7 +113,7 @@ impl Foxglove {
         Ok(Self { results: Some(sender), thread: Some(thread), is_live, dropped: 0 })
     }
 
-    /// A live dive doesn't wait: messages without room are dropped and counted.
+    /// Hands a message to the server's thread. In a live dive, messages without room are dropped and counted.
     fn send(&mut self, message: Message) {
         let Some(results) = &self.results else { return };
         if self.is_live {
@@ -135,7 +136,7 @@ impl Foxglove {
     }
 }
 
-/// The viewers' channels, by number of the result channel.
+/// Channels of the viewers, by number of the result channel.
 fn channels(context: &Arc<Context>) -> Result<Vec<Option<Arc<RawChannel>>>, foxglove::FoxgloveError> {
     let channel = |channel: headrace_replay::log::ResultChannel| {
         if channel.schema.is_empty() {
@@ -172,7 +173,7 @@ impl Drop for Foxglove {
     }
 }
 
-/// State of the thread.
+/// State of the server's thread.
 struct Server {
     handle: WebSocketServerHandle,
     channels: Vec<Option<Arc<RawChannel>>>,
@@ -205,7 +206,7 @@ impl Server {
         }
         self.view.end(&mut self.made);
         self.show();
-        // Messages in transit get a moment.
+        // Messages that are being sent get some time to arrive.
         thread::sleep(ENDS_WITHIN);
         drop(self.handle.stop());
     }
@@ -220,7 +221,7 @@ impl Server {
 
     #[expect(clippy::cast_possible_truncation, reason = "Foxglove's speeds are of single precision")]
     fn stopped(&mut self, at: MonoNs, ended: bool) {
-        // Samples placed before a jump are no longer valid.
+        // After a jump, the samples placed before it are no longer valid.
         self.view = View::new(self.site.clone());
         let Some(controlled) = &self.controlled else { return };
         self.handle.broadcast_playback_state(PlaybackState {
@@ -233,7 +234,7 @@ impl Server {
     }
 }
 
-/// Foxglove's controls as commands of playback.
+/// Converts Foxglove's controls to commands of playback.
 struct Listener {
     commands: Sender<PlaybackCommand>,
     begun: MonoNs,

@@ -1,4 +1,4 @@
-//! Signals: a dive ends in an orderly way, and only on request.
+//! Signals. They let a dive end in an orderly way, and only on request.
 
 use std::io::Read as _;
 use std::os::unix::net::UnixStream;
@@ -13,20 +13,20 @@ use signal_hook::consts::{
 
 use crate::failure::Failure;
 
-/// Signals that would end or stop the program by default, but don't concern a dive.
+/// Signals that would end or stop the program by default, but must not affect a dive.
 ///
-/// They are a closed terminal (a lost connection must not end the dive), Ctrl-Z, limits, timers and user
-/// signals. A write beyond the limit of file sizes is then an error like that of a full disk.
+/// They come from a closed terminal (a lost connection must not end the dive), Ctrl-Z, limits, timers and
+/// users. A write beyond the limit of file sizes is then an ordinary error, like a full disk.
 const PASSED_OVER: [i32; 8] = [SIGHUP, SIGTSTP, SIGUSR1, SIGUSR2, SIGXFSZ, SIGXCPU, SIGALRM, SIGVTALRM];
 
-/// Time within which several requests to end count as one.
+/// Time within which several requests to end the program count as one.
 ///
-/// `timeout -s INT` signals the program and then its group, and a held key repeats.
+/// `timeout -s INT` signals the program and then its process group, and a key that is held down repeats.
 const ONE_REQUEST: Duration = Duration::from_secs(1);
-/// Stack of the thread that waits for signals. It calls nothing deep.
+/// Stack size of the thread that waits for signals. The thread has no deep calls.
 const STACK_BYTES: usize = 64 << 10;
 
-/// Distinguishes a second request to end from a repetition of the first.
+/// Distinguishes a second request to end the program from a repetition of the first.
 #[derive(Debug, Default)]
 pub(crate) struct Requests {
     first: Option<Instant>,
@@ -39,7 +39,7 @@ impl Requests {
         self.is_second(Instant::now())
     }
 
-    /// Counts a request at `now`. Returns whether it is a second one, which ends the program at once.
+    /// Counts a request at `now`. Returns true for a second request, which ends the program at once.
     fn is_second(&mut self, now: Instant) -> bool {
         now.duration_since(*self.first.get_or_insert(now)) >= ONE_REQUEST
     }
@@ -51,12 +51,12 @@ impl Requests {
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     on(SIGHUP, &flag)?;
-    // Needed when recording from a log or a simulation.
+    // Without it, a write beyond the limit of file sizes would end a recording from a log or a simulation.
     on(SIGXFSZ, &Arc::default())?;
     Ok(flag)
 }
 
-/// Flag for a dive on ports, which continues without a terminal.
+/// Flag set by SIGINT or SIGTERM, for a dive on ports. Such a dive continues without a terminal.
 pub(crate) fn flag_of_a_dive() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     for signal in PASSED_OVER {
@@ -65,10 +65,10 @@ pub(crate) fn flag_of_a_dive() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Whether the reader of keys restores the terminal before a second signal ends the program.
+/// Whether the reader of keys handles a second signal. It restores the terminal before the program ends.
 static LEFT_TO_KEYS: AtomicBool = AtomicBool::new(false);
 
-/// From now on a second SIGINT or SIGTERM doesn't end the program; the reader of [`seconds`] does.
+/// Leaves a second SIGINT or SIGTERM to the reader of [`seconds`], which ends the program.
 pub(crate) fn leave_second_to_keys() {
     LEFT_TO_KEYS.store(true, Ordering::Relaxed);
 }
@@ -98,7 +98,7 @@ fn ending() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Sets `armed` once the first request can't be repeated any more.
+/// Sets `armed` as soon as a further request no longer counts as a repetition of the first.
 fn arm_later(armed: Arc<AtomicBool>) -> Result<(), Failure> {
     let mut signals = seconds().map_err(failed)?;
     let wait = move || {

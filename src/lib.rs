@@ -1,5 +1,6 @@
-//! The `headrace` command as a library: command line, configuration and list of device kinds. Other crates do
-//! the work. A custom binary only calls [`main`].
+//! The `headrace` command as a library: command line, configuration and list of device kinds.
+//!
+//! Other crates do the work. A custom binary calls only [`main`].
 
 mod calibrate;
 mod check;
@@ -63,8 +64,8 @@ use cli::{Cli, Command};
 
 /// Parses the command line and runs the command.
 ///
-/// Returns the exit code: 0 success, 1 failed or differs, 2 wrong file or argument, 3 finished but data was
-/// lost, 4 the replay differs from the dive.
+/// Returns the exit code. 0: success. 1: the command failed, or results differ. 2: a file or an argument is
+/// wrong. 3: the command finished, but data was lost. 4: the replay differs from the dive.
 pub fn main() -> ExitCode {
     let cli = parse();
     logging::start(&cli.verbosity);
@@ -73,7 +74,7 @@ pub fn main() -> ExitCode {
     }
     terminal::be_quiet(cli.verbosity.is_quiet());
     terminal::be_verbose(cli.verbosity.is_verbose());
-    // A dive doesn't fail because of its output, and no command fails because a terminal was closed.
+    // A dive doesn't fail if its output fails, and no command fails because its terminal was closed.
     let needs_output = !matches!(cli.command, Command::Run(_)) && !std::io::stdout().is_terminal();
     let result = match cli.command {
         Command::Demo(demo) => commands::demo(&demo),
@@ -109,14 +110,14 @@ pub fn main() -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Exit code of a command with essential output: 1 in place of 0 if some of it couldn't be written.
+/// Exit code of a command with essential output: 1 instead of 0 if some output couldn't be written.
 fn with_output(code: u8) -> u8 {
     let Some(why) = output::lost() else { return code };
     logging::complain(&format!("headrace: {why}"));
     if code == failure::OK { failure::FAILED } else { code }
 }
 
-/// Parses the command line. Help or an error ends the program.
+/// Parses the command line. After help or an error, the program ends.
 fn parse() -> Cli {
     let colour = if terminal::allows_colour() { ColorChoice::Auto } else { ColorChoice::Never };
     let matches = Cli::command().color(colour).try_get_matches();

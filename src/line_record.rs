@@ -1,4 +1,4 @@
-//! Records traffic on devices' lines outside the loop.
+//! Records traffic on devices' lines that doesn't reach the loop.
 
 use headrace_geometry::time::MonoNs;
 use headrace_ports::LineRecord;
@@ -17,7 +17,7 @@ impl LineRecord for InRecordings {
     }
 }
 
-/// Number of a sensor in the log.
+/// Number of a sensor's source in the log.
 fn source(sensor: usize) -> u16 {
     u16::try_from(sensor).unwrap_or(u16::MAX)
 }

@@ -29,8 +29,8 @@ use crate::summary::broken;
 use crate::tui;
 use crate::watch::{Show, Watch};
 
-/// Texts of the errors that `headrace check` finds in the vehicle file. A dive continues with them, but they
-/// are shown.
+/// Texts of the errors that `headrace check` would find in the vehicle file. A dive shows these errors, but
+/// runs.
 fn wrong_texts(vehicle: &VehicleConfig) -> Vec<String> {
     let errors = vehicle.findings().into_iter().filter(|finding| finding.grade == Grade::Error);
     errors.map(|finding| format!("WRONG in the vehicle file: {finding}")).collect()
@@ -106,7 +106,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     }
 }
 
-/// Page of a dive on ports.
+/// Serves the page of a dive on ports.
 fn live_page(
     args: &Run,
     vehicle: &VehicleConfig,
@@ -133,7 +133,7 @@ fn live_page(
     page::serve(&args.page, of, if shows_lines { Some(&mut say) } else { None })
 }
 
-/// Text at the beginning of a dive.
+/// Text shown at the beginning of a dive.
 fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
     let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
     let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
@@ -146,15 +146,16 @@ fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
     format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m)
 }
 
-/// Checks that a dive can be recorded to these files. With `--force` removes existing ones, as the last step
-/// that may fail.
+/// Checks that a dive can be recorded to these files.
+///
+/// With `--force` existing files are removed. This is the last step that may fail.
 pub(crate) fn make_room(logs: &[PathBuf], args: &Run, mut claims: Claims) -> Result<(), Failure> {
     let first = |log: &PathBuf| claims.claim_recording("--record", log, args.rotate.is_some());
     let firsts = logs.iter().map(first).collect::<Result<Vec<_>, _>>()?;
     firsts.iter().try_for_each(|first| outputs::make_way(first))
 }
 
-/// Each sensor's id and its connection, or the reason for which its `connect` is invalid.
+/// Id of each sensor and its connection, or the reason for which `connect` is invalid.
 pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect, ConnectError>)> {
     let sensors = vehicle.sensor_configs.iter().zip(&vehicle.sensors);
     let connect = sensors.map(|(config, device)| {
@@ -166,7 +167,7 @@ pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect,
 
 /// Numbers of the required sensors.
 ///
-/// Errors: the vehicle has no sensor with that id, or a required sensor has an invalid `connect`.
+/// Errors: the vehicle has no sensor with the id, or a required sensor has an invalid `connect`.
 fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> {
     let connections = connections(vehicle);
     let all = args.require.iter().any(|id| id == "all");
@@ -187,7 +188,7 @@ fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> 
     Ok(required)
 }
 
-/// Starts a thread per connection, with the drivers of its sensors.
+/// Starts a thread per connection. The thread runs the drivers of its sensors.
 fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Supervisor, Failure> {
     let mut programs = vehicle.programs().map_err(Failure::Plan)?.into_iter();
     let excluded = vehicle.excluded_from_lines();
@@ -218,13 +219,13 @@ fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result
         .map_err(|source| Failure::System { what: "starting the port threads", source })
 }
 
-/// A default name for the log, from the time of day.
+/// Default name of a log, made from the time of day.
 fn new_log() -> PathBuf {
     let (_, utc) = headrace_ports::clock_anchor();
     PathBuf::from(format!("dive-{}.mcap", utc.0 / 1_000_000_000))
 }
 
-/// State of each sensor.
+/// States of the sensors' ports.
 struct SensorStates {
     ids: Vec<String>,
     words: Vec<String>,
@@ -252,7 +253,7 @@ impl SensorStates {
         }
     }
 
-    /// A required sensor that wasn't running by the deadline, with its last status, as text.
+    /// Text on a required sensor that isn't running at the deadline, with the sensor's last status.
     fn missing(&self, now: MonoNs) -> Option<String> {
         let number = *self.required.first().filter(|_| now > self.required_by)?;
         let within_s = self.required_by.since(self.begun).as_secs_f64();

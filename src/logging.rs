@@ -1,4 +1,4 @@
-//! Log messages: tracing's events on stderr, filtered by `-v`, `-q` and `RUST_LOG`.
+//! Log messages: events of the crate tracing on stderr, filtered by `-v`, `-q` and `RUST_LOG`.
 
 use std::io::{self, IsTerminal as _, Write};
 use std::sync::OnceLock;
@@ -20,10 +20,12 @@ use crate::transient;
 
 /// Environment variable that filters by crate or module.
 const VARIABLE: &str = "RUST_LOG";
-/// Prefix of the targets of this program's crates.
+/// Prefix of the tracing targets of this program's crates.
 const OURS: &str = "headrace";
 
-/// Starts writing log messages to stderr. If a caller of this library has its own subscriber, that one stays.
+/// Starts to write log messages to stderr.
+///
+/// If a caller of this library has installed its own subscriber, that subscriber stays.
 pub(crate) fn start(verbosity: &Verbosity) {
     let (filter, error) = filter(verbosity.level(), std::env::var(VARIABLE).ok().as_deref());
     let layer = fmt::layer().with_ansi(terminal::of(&io::stderr()).colour).with_writer(|| Stderr);
@@ -35,10 +37,10 @@ pub(crate) fn start(verbosity: &Verbosity) {
     }
 }
 
-/// Filter for log messages, and an error text if `RUST_LOG` is invalid and thus ignored.
+/// Filter for log messages. Also returns an error text if `RUST_LOG` is invalid and therefore ignored.
 ///
-/// It passes warnings of all crates, `level` for this program's crates, and the targets named in `RUST_LOG`
-/// at their levels.
+/// The filter passes warnings of all crates, `level` for this program's crates, and the levels of the targets
+/// named in `RUST_LOG`.
 fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Option<String>) {
     let parsed = match variable.filter(|text| !text.trim().is_empty()) {
         Some(text) => text.parse::<Targets>().map_err(|error| {
@@ -61,12 +63,12 @@ fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Optio
     (filter, error)
 }
 
-/// Maximum number of lines that wait for an unread stderr during a dive.
+/// Maximum number of lines that wait in a dive whose stderr isn't read.
 const WAITING: usize = 1 << 10;
-/// Longest wait for them at the end of a dive.
+/// Longest wait for these lines at the end of a dive.
 const ENDS_WITHIN: Duration = Duration::from_secs(2);
 
-/// Stderr on a separate thread.
+/// Writer of stderr on a separate thread.
 struct Background {
     lines: Sender<Line>,
     /// Number of lines dropped for lack of room.
@@ -75,18 +77,19 @@ struct Background {
 
 enum Line {
     Text(Vec<u8>),
-    /// Its channel is disconnected once all earlier lines have been written.
+    /// Mark in the queue. It is dropped when all earlier lines have been written, which disconnects its
+    /// channel.
     Mark(Sender<()>),
 }
 
 static BACKGROUND: OnceLock<Background> = OnceLock::new();
 
-/// From now on no thread waits for stderr, so an unread stderr can't block a dive or its recorder.
+/// From now on no thread waits for stderr. If nobody reads stderr, a dive and its recorder continue.
 ///
 /// Lines without room are dropped and counted.
 pub(crate) fn never_wait() {
     let (lines, queue) = bounded(WAITING);
-    // Without the thread, all lines are dropped once the queue is full.
+    // If the thread can't be started, all lines are dropped as soon as the queue is full.
     let thread = thread::Builder::new().name("stderr".to_owned()).spawn(move || {
         for line in queue {
             match line {
@@ -100,13 +103,13 @@ pub(crate) fn never_wait() {
     }
 }
 
-/// Lines kept while the terminal is in use. The oldest are dropped and counted.
+/// Lines kept while a screen uses the terminal. The oldest lines are dropped and counted.
 struct Held {
     is_on: AtomicBool,
-    /// Lines for stderr, once the terminal is released.
+    /// Lines to be written to stderr when the terminal is released.
     kept: ArrayQueue<Vec<u8>>,
     dropped: AtomicU64,
-    /// Lines for the screen.
+    /// Lines to be shown on the screen.
     shown: ArrayQueue<String>,
 }
 
@@ -124,8 +127,9 @@ fn held() -> &'static Held {
     })
 }
 
-/// From now on nothing is written to stderr if that is a terminal, since a screen uses it. Lines are kept,
-/// and shown there.
+/// Keeps lines from now on, because a screen uses the terminal.
+///
+/// The screen shows the lines. They aren't written to stderr if stderr is a terminal.
 pub(crate) fn hold() {
     held().is_on.store(true, Ordering::Relaxed);
 }
@@ -147,12 +151,12 @@ pub(crate) fn release() {
     }
 }
 
-/// Writes a line that may hold external text to stderr, after the waiting ones.
+/// Writes a line to stderr after the waiting ones. The line may hold external text.
 pub(crate) fn complain(text: &str) {
     pass(format!("{}\n", one_line(text)).as_bytes());
 }
 
-/// Waits until all lines for stderr are written; in a dive for at most 2 s.
+/// Waits until all lines for stderr are written. In a dive the wait is at most 2 s.
 pub(crate) fn end() {
     let Some(background) = BACKGROUND.get() else { return };
     let dropped = background.dropped.swap(0, Ordering::Relaxed);
@@ -172,7 +176,9 @@ fn pass(bytes: &[u8]) {
     }
 }
 
-/// Stderr is shared with self-overwriting lines. Failed writes are dropped: a closed stderr must not end a
+/// Writes bytes to stderr at once, unless a screen uses the terminal.
+///
+/// Stderr is shared with self-overwriting lines. Failed writes are ignored: a closed stderr must not end a
 /// dive.
 fn write_now(bytes: &[u8]) {
     if let Some(held) = HELD.get().filter(|held| held.is_on.load(Ordering::Relaxed)) {
@@ -192,7 +198,7 @@ fn write_now(bytes: &[u8]) {
     cleared.and_then(|()| stderr.write_all(bytes)).ok();
 }
 
-/// A line without colours and line end.
+/// A line without colours and without the line end.
 fn plain(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let mut parts = text.trim_end().split("\x1b[");
@@ -200,7 +206,7 @@ fn plain(bytes: &[u8]) -> String {
     parts.fold(first, |line, part| line + part.split_once('m').map_or(part, |(_, rest)| rest))
 }
 
-/// An event as one line, with external text escaped. The colours are the formatter's.
+/// An event as one line. External text is escaped; the formatter's colours are kept.
 fn event(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let (line, end) = text.strip_suffix('\n').map_or((&*text, ""), |line| (line, "\n"));
@@ -242,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn event_is_one_line_without_codes_except_colours() {
+    fn event_is_one_line_whose_only_control_codes_are_colours() {
         let text = "\x1b[33mWARN\x1b[0m opened a\nb\x1b[2J\x1b]0;t\x07\u{202e}\n";
         let line = "\x1b[33mWARN\x1b[0m opened a\\nb\\u001b[2J\\u001b]0;t\\u0007\\u202e\n";
         assert_eq!(event(text.as_bytes()), line);
@@ -257,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn flags_apply_to_all_crates_of_this_program() {
+    fn verbosity_flags_apply_to_all_crates_of_this_program() {
         let shows = enabled(Some(LevelFilter::DEBUG), None);
         assert!(shows("headrace_ports::service", Level::DEBUG) && shows("headrace", Level::DEBUG));
         assert!(!shows("headrace", Level::TRACE) && !shows("other", Level::INFO));
@@ -265,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn variable_sets_the_levels_of_named_crates() {
+    fn log_variable_sets_the_levels_of_named_crates() {
         let shows = enabled(None, Some("headrace_ports=debug"));
         assert!(shows("headrace_ports::service", Level::DEBUG) && shows("headrace_replay", Level::WARN));
         assert!(!shows("headrace_replay", Level::INFO));
@@ -275,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_variable_is_named_and_ignored() {
+    fn invalid_log_variable_is_named_and_ignored() {
         let (filter, error) = filter(None, Some("headrace=loud"));
         assert!(error.unwrap().starts_with("RUST_LOG = \"headrace=loud\": "));
         assert!(

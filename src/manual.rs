@@ -1,4 +1,4 @@
-//! `headrace completions` and `headrace man`: the command line for shells and `man`.
+//! `headrace completions` and `headrace man`: describe the command line for shells and for `man`.
 
 use std::io::Write as _;
 
@@ -10,10 +10,10 @@ use crate::files;
 use crate::output::{deliver_bytes, say};
 use crate::outputs::{self, Claims, Kind};
 
-/// Name of the program in completions and pages.
+/// Name of the program in completions and manual pages.
 const NAME: &str = "headrace";
 
-/// `headrace completions`: a shell's script on stdout.
+/// `headrace completions`: writes the script for a shell to stdout.
 pub(crate) fn completions(args: &Completions) -> Result<u8, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), NAME, &mut script);
@@ -21,7 +21,7 @@ pub(crate) fn completions(args: &Completions) -> Result<u8, Failure> {
     Ok(failure::OK)
 }
 
-/// `headrace man`: the program's page on stdout, or all pages in a folder.
+/// `headrace man`: writes the program's page to stdout, or all pages into a folder.
 pub(crate) fn man(args: &Man) -> Result<u8, Failure> {
     let mut command = Cli::command().name(NAME);
     command.build();
@@ -42,7 +42,7 @@ pub(crate) fn man(args: &Man) -> Result<u8, Failure> {
     Ok(failure::OK)
 }
 
-/// File name and content of the program's page and of each command's.
+/// File name and content of each manual page: one for the program, and one per command.
 fn pages(command: &Command) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let of_commands = command.get_subcommands().filter(|command| command.get_name() != "help").map(|sub| {
         let name = format!("{NAME}-{}.1", sub.get_name());

@@ -1,7 +1,7 @@
 //! `--mavlink-out`: sends the state of the dive to ground stations such as QGroundControl and, through
 //! BlueOS, Cockpit.
 //!
-//! Heartbeats follow the loop's ticks: when the loop stops, so do they. Each alert is sent once as a text.
+//! Heartbeats follow the loop's ticks, so they stop if the loop stops. Each alert is sent once, as a text.
 
 use std::collections::BTreeSet;
 use std::net::UdpSocket;
@@ -20,26 +20,26 @@ use crate::follower::Follower;
 
 /// Interval of heartbeats, in the loop's time. Source: MAVLink, "Heartbeat/Connection Protocol".
 const HEARTBEAT_EVERY: DurNs = DurNs(1_000_000_000);
-/// Interval of figures.
+/// Interval of the figures, in the loop's time.
 const FIGURES_EVERY: DurNs = DurNs(500_000_000);
-/// Maximum number of waiting frames: some ten seconds.
+/// Maximum number of frames that wait. It corresponds to about ten seconds.
 const WAITING: usize = 256;
 
-/// Sends the state of the dive.
+/// Follower that sends the state of the dive.
 pub(crate) struct MavlinkOut {
     speaker: Speaker,
     frames: Option<Sender<Vec<u8>>>,
     thread: Option<JoinHandle<()>>,
     heartbeat: Option<MonoNs>,
     figures: Option<MonoNs>,
-    /// Alerts with texts already sent.
+    /// Numbers of the alerts whose texts have been sent.
     told: BTreeSet<u32>,
 }
 
 impl MavlinkOut {
-    /// Starts sending to an address, as a part of the vehicle with this system id.
+    /// Starts to send to an address, as a component of the vehicle with this system id.
     ///
-    /// Errors: a socket or thread can't be created. An address without a listener is no error.
+    /// Errors: a socket or thread can't be created. An address at which nobody listens is not an error.
     pub(crate) fn start(to: &str, system_id: u8) -> Result<Self, Failure> {
         let failed = |source| Failure::System { what: "starting MAVLink's output", source };
         let socket =
@@ -58,7 +58,7 @@ impl MavlinkOut {
         })
     }
 
-    /// Frames without room are dropped: a newer one follows.
+    /// Hands a frame to the sending thread. A frame without room is dropped, since a newer one follows.
     fn send(&self, frame: Vec<u8>) {
         if let Some(frames) = &self.frames {
             frames.try_send(frame).ok();
@@ -75,7 +75,7 @@ impl MavlinkOut {
     }
 }
 
-/// Whether a time is due. Time may go back in a replay.
+/// Whether the interval since `last` is over. In a replay time may go back.
 fn is_due(last: &mut Option<MonoNs>, now: MonoNs, every: DurNs) -> bool {
     let due = last.is_none_or(|last| !(0..every.0).contains(&now.since(last).0));
     if due {
@@ -112,7 +112,7 @@ impl Follower for MavlinkOut {
             self.send(frame);
         }
         if is_due(&mut self.figures, now, FIGURES_EVERY) {
-            // Milliseconds wrap after 49 days, like those of any MAVLink clock.
+            // The milliseconds wrap after 49 days, as in every MAVLink clock.
             let time_ms = u32::try_from(now.0 / 1_000_000 % (1 << 32)).unwrap_or(0);
             let unacknowledged = dive.alert_list().counts().unacknowledged;
             for (name, value) in figures(state, unacknowledged) {
@@ -134,7 +134,7 @@ impl Drop for MavlinkOut {
     }
 }
 
-/// Figures with their units: `docs/reference/screens.md` has the table. NaN if there is none.
+/// Figures by name; NaN for a missing one. `docs/reference/screens.md` has the table with their units.
 #[expect(clippy::cast_possible_truncation, reason = "MAVLink's figures are of single precision")]
 fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] {
     let known = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
@@ -158,12 +158,12 @@ fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] 
     ]
 }
 
-/// Sends frames as they come. The rest of a dive is sent before it ends.
+/// Sends frames as they come. At the end of a dive, the remaining frames are sent first.
 fn send_all(socket: &UdpSocket, to: &str, frames: &Receiver<Vec<u8>>) {
     let mut failed: u64 = 0;
     for frame in frames {
         if let Err(error) = socket.send_to(&frame, to) {
-            // There is no listener, or no route. That doesn't affect the dive, and may pass.
+            // Nobody listens, or there is no route. The dive goes on, and the fault may pass.
             if failed == 0 {
                 tracing::warn!(%error, to, "MAVLink can't be sent; retrying");
             }

@@ -38,7 +38,9 @@ pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
     Ok(if is_whole { failure::OK } else { failure::DATA_LOST })
 }
 
-/// Files of the recordings by id: named after their notes' numbers, or after their ids without a note.
+/// File names of the recordings by id.
+///
+/// A file is named after its note's number, or after the id if there is no such note.
 fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
     let name = |(id, (_, container, _)): (&u32, &(u32, Container, usize))| {
         let is_it = |note: &&NoteJson| note.voice.as_ref().is_some_and(|voice| voice.id == *id);
@@ -51,7 +53,7 @@ fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
     found.voices.iter().map(name).collect()
 }
 
-/// Texts on voice notes that should have a recording in the log but don't.
+/// Texts on voice notes whose recordings are missing in the log.
 fn missing(found: &LoggedNotes) -> Vec<String> {
     let lacks = |note: &NoteJson| {
         let voice = note.voice.as_ref().filter(|voice| voice.seconds.is_some())?;

@@ -1,4 +1,4 @@
-//! `replay` with several targets or section lengths: alternative verdicts.
+//! `replay` with several targets or section lengths: verdicts for each of them.
 
 use std::path::PathBuf;
 
@@ -16,10 +16,11 @@ use crate::phase::Phase;
 use crate::smooth;
 use crate::watch::Watch;
 
-/// Judges the dive by each of several targets in sections of each of several lengths; empty for one of each.
+/// Judges the dive for each combination of the requested targets and section lengths. Empty if there is only
+/// one.
 ///
-/// Counted visits and the times of flags depend on the target, so each combination is a replay of its own,
-/// except the one already played.
+/// Counted visits and the times of flags depend on the target. Each combination is therefore replayed, except
+/// the one that was played already.
 pub(crate) fn reports(
     args: &Replay,
     files: &[PathBuf],
@@ -49,7 +50,7 @@ pub(crate) fn reports(
     Ok(all)
 }
 
-/// Whether there are several targets, or several lengths of sections.
+/// Whether several targets or several section lengths are requested.
 pub(crate) fn is_asked(args: &Replay) -> bool {
     args.target.len() > 1 || args.section.len() > 1
 }

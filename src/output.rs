@@ -1,4 +1,4 @@
-//! Output on stdout. A closed terminal ends neither a dive nor its recording.
+//! Output on stdout. If the terminal is closed, neither a dive nor its recording ends.
 
 use std::fmt::{self, Write as _};
 use std::io::{self, BufWriter, ErrorKind, StdoutLock, Write};
@@ -16,33 +16,33 @@ use crate::failure::Failure;
 use crate::terminal;
 use crate::transient;
 
-/// Time for which a live dive waits for an unread stdout.
+/// Time for which a live dive waits while nobody reads stdout.
 pub(crate) const UNREAD_FOR: Duration = Duration::from_secs(2);
-/// Number of bytes that every reader takes within that time.
+/// Number of bytes that any reader takes within [`UNREAD_FOR`].
 const PIECE: usize = 1 << 10;
 
-/// Whether stdout has been given up: nothing more is written to it.
+/// Whether stdout has been given up. Nothing more is written to it then.
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
-/// Whether an unread stdout is given up.
+/// Whether stdout is given up if nobody reads it.
 static NEVER_WAITS: AtomicBool = AtomicBool::new(false);
 
-/// Reason for which output is lost: the first error.
+/// The first error through which output was lost.
 static LOST: OnceLock<io::Error> = OnceLock::new();
 
-/// Stops writing to stdout: an unread terminal must not keep the program from ending.
+/// Stops writing to stdout. A terminal that nobody reads must not keep the program from ending.
 pub(crate) fn give_up() {
     GIVEN_UP.store(true, Ordering::Relaxed);
 }
 
-/// From now on stdout is given up once it hasn't been read for [`UNREAD_FOR`], so a live dive ends without a
-/// reader.
+/// From now on stdout is given up if nobody has read it for [`UNREAD_FOR`]. A live dive thus ends even
+/// without a reader.
 pub(crate) fn never_wait() {
     NEVER_WAITS.store(true, Ordering::Relaxed);
 }
 
-/// Stdout for output that isn't written by a separate thread; flushed once, at its end.
+/// Stdout for one piece of output that no separate thread writes. It is flushed once, at the end.
 ///
-/// Errors: it has been given up.
+/// Errors: stdout has been given up.
 fn stdout() -> io::Result<Box<dyn Write>> {
     match (GIVEN_UP.load(Ordering::Relaxed), NEVER_WAITS.load(Ordering::Relaxed)) {
         (true, _) => Err(unread()),
@@ -51,8 +51,9 @@ fn stdout() -> io::Result<Box<dyn Write>> {
     }
 }
 
-/// Stdout that waits until it takes more, even if another process that shares its pipe has set it to
-/// non-blocking.
+/// Stdout that waits until it accepts more.
+///
+/// It waits even if another process that shares the pipe has made it non-blocking.
 struct Waiting(StdoutLock<'static>);
 
 impl Waiting {
@@ -91,7 +92,7 @@ fn unread() -> io::Error {
     io::Error::new(io::ErrorKind::TimedOut, "it is not read")
 }
 
-/// Stdout on a separate thread, which blocks no caller longer than [`UNREAD_FOR`].
+/// Stdout on a separate thread. It blocks no caller for longer than [`UNREAD_FOR`].
 struct Unheld {
     pieces: Option<Sender<Vec<u8>>>,
     done: Receiver<io::Result<()>>,
@@ -99,21 +100,21 @@ struct Unheld {
 
 impl Unheld {
     fn start() -> io::Result<Self> {
-        // A piece is handed over once the previous one has been taken.
+        // A piece is handed over as soon as the previous one has been written.
         let (pieces, queue) = bounded::<Vec<u8>>(0);
         let (ended, done) = bounded(1);
         let write = move || {
             let mut stdout = Waiting::start();
             let result = queue.iter().try_for_each(|piece| stdout.write_all(&piece));
             drop(queue);
-            // The receiver may be gone.
+            // The receiver may have given up.
             ended.send(result.and_then(|()| stdout.flush())).ok();
         };
         thread::Builder::new().name("stdout".to_owned()).spawn(write)?;
         Ok(Self { pieces: Some(pieces), done })
     }
 
-    /// Result of the writing.
+    /// Waits for the thread, and returns the result of writing.
     fn end(&mut self) -> io::Result<()> {
         self.pieces = None;
         match self.done.recv_timeout(UNREAD_FOR) {
@@ -147,8 +148,9 @@ impl Write for Unheld {
     }
 }
 
-/// Writes `text` unchanged, however long that takes: for a thread that blocks no other. Otherwise like
-/// [`put`].
+/// Writes `text` unchanged, however long that takes. Otherwise like [`put`].
+///
+/// For a thread that blocks no other thread.
 pub(crate) fn put_waiting(text: &str) {
     if GIVEN_UP.load(Ordering::Relaxed) {
         return;
@@ -159,10 +161,10 @@ pub(crate) fn put_waiting(text: &str) {
     }
 }
 
-/// Writes `text` unchanged: lines already made printable, and codes for the terminal.
+/// Writes `text` unchanged. It consists of lines that are already printable and of codes for the terminal.
 ///
-/// Errors are only logged and remembered (see [`lost`]): a closed pipe or a lost session doesn't end a dive.
-/// Nothing is written once the terminal has been given up.
+/// Errors are only logged and remembered (see [`lost`]). A closed pipe or a lost session doesn't end a dive.
+/// Nothing is written after stdout has been given up.
 pub(crate) fn put(text: &str) {
     if GIVEN_UP.load(Ordering::Relaxed) {
         return;
@@ -180,7 +182,7 @@ pub(crate) fn put(text: &str) {
     }
 }
 
-/// Remembers that output is lost. A closed pipe is no loss: its reader wants no more.
+/// Remembers that output was lost. A closed pipe doesn't count, because its reader wants no more.
 fn note(error: io::Error) {
     tracing::debug!(%error, "stdout accepts no data");
     if error.kind() != io::ErrorKind::BrokenPipe {
@@ -188,7 +190,7 @@ fn note(error: io::Error) {
     }
 }
 
-/// Reason for which output was lost without an earlier error, if any was.
+/// First error through which output was lost; `None` if none was.
 pub(crate) fn lost() -> Option<String> {
     LOST.get().map(|error| format!("writing standard output: {error}"))
 }
@@ -208,15 +210,15 @@ pub(crate) fn say(text: &str) {
     put(&format!("{}\n", one_line(text)));
 }
 
-/// Writes a line in place of a transient one, from any thread.
+/// Writes a line in place of a transient one. May be called from any thread.
 pub(crate) fn aside(text: &str) {
     let clear = if transient::take() { terminal::CLEAR } else { "" };
     put(&format!("{clear}{}\n", one_line(text)));
 }
 
-/// Writes output for another program, and a line end.
+/// Writes output for another program, followed by a line end.
 ///
-/// Errors: the write is incomplete, or a live dive's output isn't read. A closed pipe is no error.
+/// Errors: the output is incomplete, or in a live dive nobody reads it. A closed pipe is not an error.
 pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
     deliver_bytes(format!("{}\n", lines(text)).as_bytes())
 }
@@ -232,14 +234,14 @@ pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
     taken(stdout().and_then(write))
 }
 
-/// Writes clap's help to a terminal or a file.
+/// Writes clap's help text to a terminal or a file.
 ///
 /// Errors: see [`deliver`].
 pub(crate) fn deliver_help(help: &clap::Error) -> Result<(), Failure> {
     taken(help.print().and_then(|()| io::stdout().flush()))
 }
 
-/// Result of a write. A closed pipe is no error: its reader wants no more.
+/// Result of a write. A closed pipe counts as success, because its reader wants no more.
 fn taken(written: io::Result<()>) -> Result<(), Failure> {
     match written {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -247,7 +249,7 @@ fn taken(written: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
-/// Writes a report as JSON, without holding all of it in memory.
+/// Writes a report as JSON, without holding the whole text in memory.
 ///
 /// Errors: see [`deliver`].
 pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
@@ -260,12 +262,12 @@ fn failed(source: io::Error) -> Failure {
     Failure::Write { path: "standard output".into(), source }
 }
 
-/// Makes text printable, in whatever pieces it comes.
+/// Writer that makes text printable, wherever the text is cut into pieces.
 struct Plain<W>(W);
 
 impl<W: Write> Write for Plain<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // An incomplete character comes again with the next bytes.
+        // An incomplete character stays with the caller, who writes it again with the next bytes.
         let whole = match str::from_utf8(bytes) {
             Ok(text) => text,
             Err(error) if error.valid_up_to() > 0 => bytes

@@ -1,4 +1,4 @@
-//! Checks before the work that a command's output files may be overwritten and can be written.
+//! Checks before the work whether a command may overwrite its output files and can write them.
 
 mod claims;
 
@@ -13,9 +13,9 @@ use crate::failure::Failure;
 use crate::files;
 pub(crate) use claims::Claims;
 
-/// Key of a log's metadata: the simulated scene.
+/// Metadata key of a log: name of the simulated scene.
 pub(crate) const SIMULATED: &str = "simulated";
-/// Key of a log's metadata: the format that it was imported from.
+/// Metadata key of a log: format from which it was imported.
 pub(crate) const IMPORTED: &str = "import_format";
 /// First line of a rehearsal's vehicle file.
 pub(crate) const REHEARSAL: &str = "# Rehearsal by headrace emulate: ";
@@ -27,14 +27,14 @@ pub(crate) const MANUAL: &str = ".\\\" Written by headrace man.\n";
 pub(crate) const EXPORTED: &str = "<!-- headrace export -->\n";
 /// First line of a table of true values.
 pub(crate) const TRUTH: &str = "# true values: ";
-/// A key of every report.
+/// Text that every report contains.
 const REPORT: &str = "\"report_version\":";
 
-/// A kind of output. A file of the same kind is overwritten, any other only with `--force`.
+/// A kind of output. A file of the same kind is overwritten. Other files need `--force`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Report,
-    /// A dive recorded live, which is never overwritten without `--force`.
+    /// A dive recorded live. It is never overwritten without `--force`.
     Dive,
     Simulation,
     Import,
@@ -45,12 +45,12 @@ pub(crate) enum Kind {
     Picture,
     Manual,
     Page,
-    /// The recording of a voice note, which can't be distinguished from another one.
+    /// The recording of a voice note. The file doesn't show to which note it belongs.
     Voice,
 }
 
 impl Kind {
-    /// Reason for not overwriting another file.
+    /// Reason for which a file of another kind is not overwritten.
     fn refusal(self) -> &'static str {
         match self {
             Self::Report => "isn't a report",
@@ -91,7 +91,7 @@ impl Kind {
     }
 }
 
-/// The first bytes of a file, as text.
+/// Beginning of a file, as text.
 fn begin(path: &Path) -> Option<String> {
     let mut bytes = Vec::new();
     std::fs::File::open(path).ok()?.take(4096).read_to_end(&mut bytes).ok()?;
@@ -102,7 +102,7 @@ fn begins(path: &Path, mark: &str) -> bool {
     begin(path).is_some_and(|text| text.starts_with(mark))
 }
 
-/// Whether a file, of any size, ends with this mark.
+/// Whether a file ends with this mark. The file may have any size.
 fn ends(path: &Path, mark: &str) -> bool {
     let end = || {
         let mut file = std::fs::File::open(path)?;
@@ -115,13 +115,14 @@ fn ends(path: &Path, mark: &str) -> bool {
     end().unwrap_or(false)
 }
 
-/// Checks, before the work, that a file may and can be written, without changing anything.
+/// Checks before the work that a file may be overwritten and can be written. The file isn't changed.
 ///
-/// Errors: the existing file isn't of this kind and there is no `--force`; or it can't be written or created.
+/// Errors: the existing file is of another kind and there is no `--force`, or the file can't be written or
+/// created.
 fn may_write(path: &Path, kind: Kind, force: bool) -> Result<(), Failure> {
     let failed = |source| Failure::Unwritable { path: path.to_owned(), source };
     if path.symlink_metadata().is_err() {
-        // Only creating it is a certain test.
+        // Only creating the file shows for certain that it can be created.
         OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
         return std::fs::remove_file(path).map_err(failed);
     }
@@ -137,14 +138,15 @@ fn may_write(path: &Path, kind: Kind, force: bool) -> Result<(), Failure> {
         )));
     }
     if is_pipe(path) {
-        // Opening it would wait for a reader, and closing it would end the reader's input.
+        // Opening a pipe would wait for a reader, and closing it would end the reader's input.
         return rustix::fs::access(path, rustix::fs::Access::WRITE_OK).map_err(|error| failed(error.into()));
     }
     OpenOptions::new().write(true).open(path).map(|_| ()).map_err(failed)
 }
 
-/// Removes a file that may be overwritten, for writers that create only new files. Terminals, pipes and
-/// devices remain.
+/// Removes a file that may be overwritten, for writers that create only new files.
+///
+/// Terminals, pipes and devices remain.
 pub(crate) fn make_way(path: &Path) -> Result<(), Failure> {
     if !path.is_file() {
         return Ok(());

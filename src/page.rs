@@ -1,4 +1,4 @@
-//! The operator's page of a dive: starting, feeding and ending it.
+//! Starts, feeds and ends the operator's page of a dive.
 
 #![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
 
@@ -47,7 +47,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Name of a BlueOS machine.
 const BLUEOS: &str = "blueos.local";
 
-/// The dive that a page shows.
+/// Information about the dive that the page shows.
 pub(crate) struct Of<'a> {
     pub(crate) vehicle: &'a VehicleConfig,
     pub(crate) mode: Mode,
@@ -56,23 +56,23 @@ pub(crate) struct Of<'a> {
     pub(crate) recorded_to: Option<String>,
     /// Second target that the dive is compared with, m.
     pub(crate) compared_m: Option<f64>,
-    /// UTC of the clock's zero, if the clock is this machine's.
+    /// UTC of the clock's zero, s, if the clock is that of this machine.
     pub(crate) utc_of_zero_s: Option<f64>,
     /// First and last time of a log.
     pub(crate) span: Option<(MonoNs, MonoNs)>,
-    /// Whether it can be paused and can jump.
+    /// Whether the dive can be paused and can jump.
     pub(crate) is_playback: bool,
     /// Receiver of the operator's commands; `None` in a replay.
     pub(crate) console: Option<ConsolePort>,
-    /// Storage for recordings of voice notes.
+    /// Source or destination of the recordings of voice notes.
     pub(crate) voices: VoicesOf,
 }
 
-/// Storage for recordings of voice notes.
+/// Source or destination of the recordings of voice notes.
 pub(crate) enum VoicesOf {
-    /// Logs of a live dive; empty if it isn't recorded.
+    /// Logs of a live dive, to which recordings are written; empty if the dive isn't recorded.
     Dive(Vec<VoicePort>),
-    /// Files of a log.
+    /// Files of a log, in which recordings are found.
     Log(Vec<PathBuf>),
 }
 
@@ -85,14 +85,15 @@ pub(crate) struct Served {
     commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>>,
 }
 
-/// Whether to serve a page: it was requested, or a person watches.
+/// Whether to serve a page: it was requested, or a person watches on a terminal.
 pub(crate) fn is_wanted(args: &PageArgs, is_watched: bool) -> bool {
     !args.no_page && (args.page.is_some() || is_watched && std::io::stdout().is_terminal())
 }
 
-/// Serves the page of a dive. A failure is reported on stderr, and the dive continues without the page.
+/// Serves the page of a dive. If that fails, the reason goes to stderr and the dive continues without the
+/// page.
 ///
-/// `lines` takes the address among the dive's lines.
+/// `lines` writes the page's address among the dive's lines.
 pub(crate) fn serve(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Option<Served> {
     match start(args, of, lines) {
         Ok(served) => Some(served),
@@ -132,7 +133,7 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
     Ok(Served { page, span, is_playback, waits, commands })
 }
 
-/// Tokens, if other machines can reach the page.
+/// Tokens for access; `None` if other machines can't reach the page.
 fn tokens(args: &PageArgs, address: SocketAddr) -> Result<Option<Tokens>, String> {
     if let Some(path) = &args.page_token_file {
         return read_tokens(path).map(Some);
@@ -164,7 +165,7 @@ fn read_tokens(path: &Path) -> Result<Tokens, String> {
     Ok(Tokens { viewer: token("viewer")?, operator: token("operator")? })
 }
 
-/// Names of this machine in browsers.
+/// Names under which browsers may address this machine.
 fn hosts(args: &PageArgs) -> Vec<String> {
     let own = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let own = own.trim();
@@ -172,7 +173,7 @@ fn hosts(args: &PageArgs) -> Vec<String> {
     own.chain([BLUEOS.to_owned()]).chain(args.page_host.iter().cloned()).collect()
 }
 
-/// Address of the page. Its tokens are shown only on a terminal, and never logged.
+/// Address of the page, as text. Its tokens are shown only on a terminal, and are never logged.
 fn told(page: &Page, tokens: Option<&Tokens>) -> String {
     let (scheme, at) = (page.scheme(), page.address());
     let host = if at.ip().is_unspecified() { own_address(at.ip()) } else { at.ip() };
@@ -188,7 +189,7 @@ fn told(page: &Page, tokens: Option<&Tokens>) -> String {
     lines
 }
 
-/// Address by which other machines reach this one. Nothing is sent.
+/// Address by which other machines reach this machine. Finding it sends nothing.
 fn own_address(unspecified: IpAddr) -> IpAddr {
     let (any, beyond) =
         if unspecified.is_ipv4() { ("0.0.0.0:0", "192.0.2.1:9") } else { ("[::]:0", "[2001:db8::1]:9") };
@@ -199,7 +200,7 @@ fn own_address(unspecified: IpAddr) -> IpAddr {
     found.map_or(unspecified, |address| address.ip())
 }
 
-/// Tunnel, heads and sensors.
+/// Tunnel, heads and sensors for the page.
 pub(crate) fn site(of: Of<'_>) -> Site {
     let vehicle = of.vehicle;
     let hidden = hidden_by_vehicle(&vehicle.heads(), &vehicle.hull);
@@ -252,14 +253,14 @@ fn kind_text(kind: Sense) -> &'static str {
     }
 }
 
-/// UTC of the zero of a log's clock, seconds, if the log states it.
+/// UTC of the zero of a log's clock, seconds; `None` if the log doesn't state it.
 pub(crate) fn utc_of_zero_s(metadata: &BTreeMap<String, String>) -> Option<f64> {
     let number = |key: &str| metadata.get(key)?.parse::<i64>().ok();
     let [monotonic, utc] = CLOCK_ANCHOR.map(number);
     Some(utc?.checked_sub(monotonic?)? as f64 / 1e9)
 }
 
-/// Hands an operator's commands to the loop.
+/// Creates the function that hands an operator's commands to the loop.
 fn act(console: Option<ConsolePort>) -> Act {
     Arc::new(move |command| {
         let Some(console) = &console else { return Err("this dive takes no commands".to_owned()) };
@@ -278,9 +279,9 @@ fn act(console: Option<ConsolePort>) -> Act {
     })
 }
 
-/// Hands recordings of voice notes to all logs, or finds them in a log.
+/// Creates the function that hands recordings of voice notes to all logs, or that finds them in a log.
 ///
-/// One log must take a recording; then the loop is informed.
+/// The loop is informed when at least one log has taken a recording.
 fn voices(of: &Of<'_>) -> Voices {
     match (&of.voices, &of.console) {
         (VoicesOf::Log(files), _) => {
@@ -305,7 +306,7 @@ fn voices(of: &Of<'_>) -> Voices {
     }
 }
 
-/// Hands the page's commands to playback while there is one.
+/// Creates the function that hands the page's commands to playback, as long as there is one.
 fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
     let commands = Arc::clone(commands);
     Arc::new(move |play| {
@@ -329,7 +330,7 @@ fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
 }
 
 impl Served {
-    /// Follower that feeds the page.
+    /// Creates the follower that feeds the page.
     pub(crate) fn follower(&self, dive: &Loop) -> Box<dyn Follower> {
         let span = self.span.filter(|_| self.is_playback);
         Box::new(PageFollower { collector: self.page.collector(dive, self.waits), span, now: MonoNs(0) })
@@ -337,8 +338,8 @@ impl Served {
 
     /// Lets the page control a replay.
     ///
-    /// With `stays` the replay remains at the end of the log until `interrupted`. Otherwise the returned
-    /// value releases control.
+    /// With `stays` the replay remains at the end of the log until `interrupted`. Without it, the returned
+    /// function ends the control.
     pub(crate) fn direct(
         &self,
         to: &Sender<PlaybackCommand>,
@@ -357,13 +358,13 @@ impl Served {
             while !interrupted.load(Ordering::Relaxed) {
                 std::thread::sleep(LOOK_EVERY);
             }
-            // It may have ended by itself.
+            // Playback may have ended already.
             let _ended = sender.send(PlaybackCommand::End);
         });
         None
     }
 
-    /// Opens a browser, if there is one and a person to see it.
+    /// Opens a browser, if this machine has one and a person can see it.
     pub(crate) fn open(&self) {
         let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"]
             .iter()
@@ -380,13 +381,13 @@ impl Served {
         }
     }
 
-    /// Ends the page with the dive's report.
+    /// Ends the page, and shows the dive's report on it.
     pub(crate) fn end(self, report: &Report) {
         self.page.end(Some(end_message(report)));
     }
 }
 
-/// Last message of a dive.
+/// Last message of a dive to its page.
 pub(crate) fn end_message(report: &Report) -> Value {
     json!({"type": "end", "digest": report.digest, "summary": report.summary, "way": report.way,
         "exit": exit_code(report)})
@@ -399,7 +400,7 @@ pub(crate) fn following(collector: Collector) -> Box<dyn Follower> {
 
 struct PageFollower {
     collector: Collector,
-    /// First and last time of a replay's log.
+    /// First and last time of a replay's log; `None` in a live dive.
     span: Option<(MonoNs, MonoNs)>,
     now: MonoNs,
 }

@@ -4,7 +4,9 @@ use std::time::Instant;
 
 use tracing::span::EnteredSpan;
 
-/// A phase of a command from its start until it is dropped. Log messages of this thread in between are inside its span.
+/// A phase of a command. It lasts from its start until it is dropped.
+///
+/// Log messages of the same thread during the phase belong to its span.
 pub(crate) struct Phase {
     started: Instant,
     _span: EnteredSpan,

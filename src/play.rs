@@ -1,4 +1,4 @@
-//! `replay --from` and `replay --interactive`: playback, with keys in a terminal, or commands in lines on
+//! `replay --from` and `replay --interactive`: playback, controlled by keys in a terminal or by lines on
 //! standard input.
 
 mod keys;
@@ -27,18 +27,19 @@ use crate::watch::Watch;
 use keys::Keyboard;
 pub(crate) use keys::{Hand, Key};
 
-/// Work between two snapshots. Including the time to restore one, a jump takes well under a second.
+/// Computing time between two snapshots. A jump thus takes well under a second, including the time to restore
+/// a snapshot.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
-/// Memory for snapshots. When it is full, every other one is dropped and the interval doubled.
+/// Memory for snapshots, bytes. When it is full, every other snapshot is dropped and the interval is doubled.
 const SNAPSHOT_BYTES: usize = 256 << 20;
 
 /// Controllers of playback besides standard input.
 ///
-/// Each has a sender of commands, and playback continues while there is one.
+/// Each has a sender of commands. Playback continues as long as there is a sender.
 pub(crate) struct Directors {
-    /// Whether one of them takes the terminal's keys.
+    /// Whether one of the controllers reads the terminal's keys.
     pub(crate) takes_keys: bool,
-    /// Drops the sender of a controller that doesn't stay at the end of the log.
+    /// Drops the sender of a controller, unless the controller stays at the end of the log.
     pub(crate) close: Option<Box<dyn Fn()>>,
 }
 
@@ -48,15 +49,15 @@ pub(crate) struct Playing {
     pub(crate) interactive: bool,
     pub(crate) pace: Pace,
     pub(crate) commands: (Sender<PlaybackCommand>, Receiver<PlaybackCommand>),
-    /// Other controllers.
+    /// Controllers besides standard input.
     pub(crate) others: Option<Directors>,
 }
 
 impl Playing {
-    /// Plays a dive; returns the report.
+    /// Plays a dive, and returns the report.
     pub(crate) fn play(self, dive: Dive, player: &mut Player, watch: &mut Watch) -> Result<Report, Failure> {
         let Self { from, interactive, pace, commands: (sender, commands), others } = self;
-        // Without commands, no jump goes back.
+        // Without commands no jump goes back, so no snapshots are needed.
         let interval = if interactive || others.is_some() { SNAPSHOT_INTERVAL } else { Duration::MAX };
         dive.play(watch, |armed, notices, watch| {
             let interactive = interactive && !others.as_ref().is_some_and(|others| others.takes_keys);
@@ -71,7 +72,7 @@ impl Playing {
                 playback.seek(screen.begun + from, &mut screen)?;
             }
             screen.watch.mode(false, pace.speed);
-            // Keys come from a terminal, lines from a pipe or a file.
+            // A terminal gives keys; a pipe or a file gives lines.
             let keyboard = match interactive {
                 true if has_keys => Some(keyboard(sender, pace)?),
                 true => {
@@ -90,12 +91,12 @@ impl Playing {
     }
 }
 
-/// Whether single keys are read: standard input is a terminal.
+/// Whether single keys are read. That requires a terminal as standard input.
 pub(crate) fn has_keys() -> bool {
     std::io::stdin().is_terminal()
 }
 
-/// Reads keys of the terminal until it is dropped.
+/// Reads keys of the terminal until the returned value is dropped.
 fn keyboard(to: Sender<PlaybackCommand>, pace: Pace) -> Result<Keyboard, Failure> {
     let failed = |source| Failure::System { what: "reading keys from the terminal", source };
     Keyboard::listen(to, pace.speed, interrupt::flag()?).map_err(failed)
@@ -107,7 +108,7 @@ struct Screen<'a> {
     watch: &'a mut Watch,
     begun: MonoNs,
     has_keys: bool,
-    /// Ends other commands at the end of the log.
+    /// Releases the other controllers at the end of the log.
     close: Option<Box<dyn Fn()>>,
 }
 
@@ -139,7 +140,7 @@ impl PlaybackObserver for Screen<'_> {
     }
 }
 
-/// Reads commands from standard input, on a thread that ends with it.
+/// Reads commands from standard input on a separate thread, until standard input ends.
 fn listen(to: Sender<PlaybackCommand>, begun: MonoNs) {
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {

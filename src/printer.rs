@@ -1,4 +1,5 @@
-//! Writes a dive's lines to stdout on a thread of its own, so an unread terminal doesn't block a live dive.
+//! Writes a dive's lines to stdout on a separate thread, so that an unread terminal doesn't block a live
+//! dive.
 
 use std::thread::{self, JoinHandle};
 
@@ -7,7 +8,7 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bound
 use crate::output::{UNREAD_FOR, give_up, put_waiting};
 use crate::{terminal, transient};
 
-/// Maximum number of waiting lines. A dive has a line a second, and some for each stretch.
+/// Maximum number of lines that wait. A dive has about one line a second, and a few for each stretch.
 const WAITING: usize = 1 << 10;
 
 enum Message {
@@ -20,18 +21,18 @@ enum Message {
 pub(crate) struct Printer {
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
-    /// Disconnected once the thread has written all lines.
+    /// Disconnected when the thread has written all lines.
     done: Receiver<()>,
-    /// Drops lines without room instead of waiting.
+    /// Whether lines without room are dropped, instead of waiting.
     lossy: bool,
     dropped: u64,
 }
 
 impl Printer {
-    /// Starts the thread. A `lossy` printer never waits: lines without room are dropped and counted.
+    /// Starts the thread. A `lossy` printer never waits. It drops and counts lines without room.
     pub(crate) fn start(lossy: bool) -> Self {
         let (sender, messages) = bounded(WAITING);
-        // Without the thread all lines are dropped, which the end reports.
+        // If the thread can't be started, all lines are dropped, and the end of the dive reports that.
         let (writing, done) = bounded(0);
         let write = move || {
             print(&messages);
@@ -46,7 +47,7 @@ impl Printer {
         self.lossy = true;
     }
 
-    /// Writes a printable line.
+    /// Writes a line of printable text.
     pub(crate) fn line(&mut self, text: String) {
         self.send(Message::Line(text));
     }
@@ -66,7 +67,7 @@ impl Printer {
         self.dropped += u64::from(full);
     }
 
-    /// Waits until all lines are written; if lossy for at most [`UNREAD_FOR`].
+    /// Waits until all lines are written. A lossy printer waits for at most [`UNREAD_FOR`].
     ///
     /// An unread terminal must not keep a dive from completing its log.
     pub(crate) fn end(&mut self) {
@@ -100,7 +101,7 @@ impl Drop for Printer {
 fn print(messages: &Receiver<Message>) {
     let mut has_status = false;
     let close = |has_status: &mut bool| {
-        // A log message has already cleared it, so its content is gone.
+        // If a log message has cleared the status line already, there is nothing to clear.
         if core::mem::take(has_status) && transient::take() {
             put_waiting(terminal::CLEAR);
         }

@@ -1,6 +1,6 @@
-//! Progress of a command on stderr, with the time left.
+//! Shows the progress of a command on stderr, with the time left.
 //!
-//! It is shown if stderr is a terminal and the command takes over two seconds.
+//! Progress is shown if stderr is a terminal and the command takes over two seconds.
 
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
@@ -14,13 +14,13 @@ const AFTER: Duration = Duration::from_secs(2);
 const EVERY: Duration = Duration::from_millis(200);
 /// Number of calls between two reads of the clock.
 const CALLS: u32 = 1000;
-/// Share of the work done from which the time left is shown.
+/// Share of the work from which the time left is shown.
 const TELLING: f64 = 0.01;
 
 /// Minimum interval between log messages on progress.
 const LOG_EVERY: Duration = Duration::from_secs(5);
 
-/// Shows progress as a line that overwrites itself and is removed at the end, and logs it.
+/// Shows progress as a line that overwrites itself and is removed at the end. Also logs the progress.
 pub(crate) struct Progress {
     terminal: bool,
     started: Instant,
@@ -41,8 +41,9 @@ impl Progress {
         }
     }
 
-    /// Shows progress if an update is due. Only then it calls `state`, for the work done as text and as a
-    /// share.
+    /// Shows progress if an update is due.
+    ///
+    /// `state` is called only then. It returns the work done, as text and as a share.
     pub(crate) fn at(&mut self, state: impl FnOnce() -> (String, Option<f64>)) {
         self.calls += 1;
         if !self.calls.is_multiple_of(CALLS) {
@@ -98,7 +99,7 @@ impl Drop for Progress {
     }
 }
 
-/// Shows how many of a file's `of_bytes` have been written.
+/// Writer that shows how many of a file's `of_bytes` have been written.
 pub(crate) struct Writing<W> {
     to: W,
     progress: Progress,
@@ -130,12 +131,12 @@ impl<W: Write> Write for Writing<W> {
     }
 }
 
-/// Seconds left of work with this share done; `None` if it is too early to estimate, or done.
+/// Seconds left of work with this share done; `None` if it is too early for an estimate, or the work is done.
 fn left_s(elapsed_s: f64, share: f64) -> Option<f64> {
     (TELLING..1.0).contains(&share).then(|| elapsed_s * (1.0 - share) / share)
 }
 
-/// A duration to about two digits.
+/// A duration as text with about two digits.
 fn duration_text(seconds: f64) -> String {
     let minutes = seconds / 60.0;
     match seconds {
@@ -150,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_left_extrapolates_the_speed_so_far() {
+    fn time_left_is_extrapolated_from_the_work_done() {
         assert_eq!(left_s(3.0, 0.25), Some(9.0));
         assert_eq!((left_s(3.0, 0.0), left_s(3.0, 1.0), left_s(3.0, f64::NAN)), (None, None, None));
         let texts = [0.2, 59.0, 99.0, 100.0, 3600.0, 7200.0].map(duration_text);

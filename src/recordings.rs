@@ -16,8 +16,9 @@ use crate::report_output::files_report;
 #[derive(Default)]
 pub(crate) struct Recordings {
     all: Vec<One>,
-    /// Whether its time is this machine's. Unsynced data of a replay may be minutes of a dive, but a power
-    /// cut doesn't lose it.
+    /// Whether the dive's time is that of this machine.
+    ///
+    /// In a replay, unsynced data may hold minutes of a dive, but a power cut doesn't lose them.
     is_live: bool,
     unsafe_for: DurNs,
 }
@@ -25,7 +26,7 @@ pub(crate) struct Recordings {
 struct One {
     path: PathBuf,
     handle: RecorderHandle,
-    /// Whether it is failing at present; `None` if it has never failed.
+    /// Whether the recording is failing at present; `None` if it has never failed.
     fails: Option<bool>,
     is_late: bool,
 }
@@ -36,7 +37,7 @@ impl Recordings {
         Self { all: recorders.into_iter().map(one).collect(), is_live, unsafe_for: DurNs(0) }
     }
 
-    /// Events since the last call. Call it after every tick.
+    /// Takes the events since the last call. Call this function after every tick.
     pub(crate) fn news(&mut self) -> Vec<RecordingEvent> {
         let mut news = Vec::new();
         self.unsafe_for = DurNs(0);
@@ -60,25 +61,25 @@ impl Recordings {
         RecordingState { fails, unsafe_s: self.unsafe_for.0.max(0).unsigned_abs() / 1_000_000_000 }
     }
 
-    /// Whether a power cut would lose the last seconds of the dive in one of them.
+    /// Whether a recording fails, or would lose the last seconds of the dive in a power cut.
     pub(crate) fn is_alarm(&self) -> bool {
         self.all.iter().any(|one| one.is_late || one.fails == Some(true))
     }
 
-    /// Inputs for traffic on devices' lines outside the loop.
+    /// Ports for traffic on devices' lines outside the loop.
     pub(crate) fn line_ports(&self) -> Vec<LinePort> {
         self.all.iter().map(|one| one.handle.line_port()).collect()
     }
 
-    /// Inputs for recordings of voice notes.
+    /// Ports for recordings of voice notes.
     pub(crate) fn voice_ports(&self) -> Vec<VoicePort> {
         self.all.iter().map(|one| one.handle.voice_port()).collect()
     }
 
     /// Ends all recordings at the same time.
     ///
-    /// The report has the first one's files and the losses of all. Missing media don't keep the others from
-    /// ending.
+    /// The result has the files of the first recording and the losses of all. If a medium is missing, the
+    /// other recordings still end.
     pub(crate) fn end(mut self, report: &Report) -> Option<LogReport> {
         self.all.iter_mut().for_each(|one| one.handle.begin_to_end(self.is_live));
         let (mut log, several): (Option<LogReport>, _) = (None, self.all.len() > 1);
@@ -111,7 +112,7 @@ impl Recordings {
 }
 
 impl One {
-    /// Event if it has fallen behind or caught up.
+    /// Event if the recording has just fallen behind or caught up.
     fn late(&mut self, unsafe_for: DurNs) -> Option<RecordingEvent> {
         let is_late = unsafe_for >= if self.is_late { SHOWN_FROM } else { ALARM_FROM };
         let has_changed = core::mem::replace(&mut self.is_late, is_late) != is_late;
@@ -126,7 +127,7 @@ impl One {
     }
 }
 
-/// Text on data missing in a recording, and on errors during it.
+/// Texts on data missing in a recording, and on errors while it was recorded.
 fn unrecorded(written: &Summary) -> Vec<String> {
     let mut losses: Vec<String> = written.faults.iter().map(fault).collect();
     losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
@@ -147,7 +148,7 @@ fn fault(fault: &RecordingFault) -> String {
     [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
 }
 
-/// Text on data that the recorder dropped, with times.
+/// Text on data that the recorder has dropped, with times.
 fn left_out(left: LeftOut) -> String {
     let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
     format!("{}{}", left.words(), span.unwrap_or_default())

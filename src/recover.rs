@@ -1,4 +1,4 @@
-//! `headrace recover`: writes the readable part of a damaged log as a valid one.
+//! `headrace recover`: writes the readable part of a damaged log as a valid log.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::progress::Writing;
 
 /// `headrace recover`.
 pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
-    // Fails before the output is created.
+    // An error here occurs before the output is created.
     let files = files_of(&args.logs)?;
     DiveLog::open(&files)?;
     Claims::reading(files.clone(), &args.overwrite).claim("-o", &args.output, Kind::Recovered)?;

@@ -1,4 +1,4 @@
-//! Report of a finished dive: the entry on its log, its output, and the exit code.
+//! Report of a finished dive: its entry on the log, its output, and the exit code.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::output::{deliver, deliver_json, show};
 use crate::screen::Screen;
 use crate::summary::summary;
 
-/// Adds the replayed log and its losses to the report.
+/// Adds the replayed log and the log's losses to the report.
 pub(crate) fn note_losses(report: &mut Report, path: &Path, player: &Player) {
     let recorded = report.log.take();
     let files: Vec<_> = player.files().iter().map(|file| (file.path.as_path(), file.messages)).collect();
@@ -26,8 +26,9 @@ pub(crate) fn note_losses(report: &mut Report, path: &Path, player: &Player) {
     report.log = Some(log);
 }
 
-/// Files of a log for the report. A file that can't be read back counts as a loss, and only its digest is
-/// missing.
+/// Entry of the report for a log's files.
+///
+/// A file that can't be read back counts as a loss, and its digest is missing.
 pub(crate) fn files_report(named: &Path, files: &[(&Path, u64)]) -> LogReport {
     let paths: Vec<&Path> =
         if files.is_empty() { vec![named] } else { files.iter().map(|(path, _)| *path).collect() };
@@ -39,7 +40,7 @@ pub(crate) fn files_report(named: &Path, files: &[(&Path, u64)]) -> LogReport {
         })
     };
     let sha256 = digest(files_digest(&paths));
-    // The list is empty if the only file is the named one.
+    // If the named file is the only one, there are no parts to list.
     let named_alone = matches!(files, [(only, _)] if *only == named);
     let parts = files.iter().filter(|_| !named_alone).map(|(path, messages)| PartReport {
         path: path.display().to_string(),
@@ -55,7 +56,7 @@ pub(crate) fn files_report(named: &Path, files: &[(&Path, u64)]) -> LogReport {
 }
 
 pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
-    // A report that can't be written doesn't suppress the summary.
+    // If the report can't be written, the summary is still printed.
     let written = output.report.as_ref().map_or(Ok(()), |path| files::write_json(path, report));
     if output.json_lines {
         let end = json!({"type": "end", "digest": report.digest, "way": report.way, "summary": report.summary,

@@ -7,15 +7,15 @@ use headrace_monitor::live_state::Lamp;
 
 use crate::terminal::{self, Terminal};
 
-/// Width assumed for a terminal that doesn't report its own.
+/// Width assumed for a terminal that doesn't report its width.
 const COLUMNS: usize = 80;
-/// Minimum width assumed for narrower terminals.
+/// Minimum width assumed, even if the terminal is narrower.
 const LEAST_COLUMNS: usize = 40;
 
 /// Capabilities of stdout.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Screen {
-    /// Lines can be overwritten.
+    /// Whether lines can be overwritten.
     pub(crate) overwrites: bool,
     colours: bool,
 }
@@ -27,9 +27,10 @@ impl Screen {
         Self { overwrites, colours: colour }
     }
 
-    /// Columns that a line may fill, which may change; `None` in a pipe or file, without a limit.
+    /// Number of columns that a line may fill; `None` in a pipe or file, where there is no limit. The width
+    /// may change.
     ///
-    /// The last column stays empty, since a full one would wrap on some terminals.
+    /// The last column stays empty, because a full line would wrap on some terminals.
     pub(crate) fn columns() -> Option<usize> {
         let stdout = std::io::stdout();
         if !stdout.is_terminal() {

@@ -77,7 +77,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
             truth.write(&scene, &simulation.take_truth())?;
         }
     }
-    // The length of an advised pilot's dive depends on the advice.
+    // If the simulated pilot follows advice, the duration of the dive is known only now.
     let duration_s = simulation.duration_s();
     let (file, written) = writer.finish().map_err(Failure::writing(output))?;
     file.complete().map_err(failed)?;
@@ -106,7 +106,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     Ok(failure::OK)
 }
 
-/// Ground truth as CSV, with a row per measurement.
+/// Writer of the ground truth as CSV, with a row per measurement.
 struct Truth {
     path: PathBuf,
     file: AtomicFile,
@@ -140,7 +140,7 @@ impl Truth {
         Ok(())
     }
 
-    /// Moves the file into place; returns its number of rows.
+    /// Moves the file into place. Returns its number of rows.
     fn finish(self) -> Result<u64, Failure> {
         let Self { path, file, rows, .. } = self;
         file.complete().map_err(|source| Failure::Write { path, source })?;
@@ -213,7 +213,7 @@ impl Truth {
     }
 }
 
-/// A time of the dive's clock, seconds, exact to the nanosecond.
+/// A time on the dive's clock, seconds, exact to the nanosecond.
 fn seconds(at: MonoNs) -> String {
     format!("{}.{:09}", at.0 / 1_000_000_000, at.0 % 1_000_000_000)
 }

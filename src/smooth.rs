@@ -1,4 +1,4 @@
-//! `replay --smooth`: a replay with the filter, smoothing, and a replay along the smoothed trajectory.
+//! `replay --smooth`: replays with the filter, smooths the trajectory, and replays along it.
 
 use std::path::{Path, PathBuf};
 
@@ -14,8 +14,9 @@ use crate::failure::Failure;
 use crate::phase::Phase;
 use crate::watch::Watch;
 
-/// Report of a dive judged along its smoothed trajectory. `player` plays the log from its beginning, for its
-/// losses.
+/// Report of a dive judged along its smoothed trajectory.
+///
+/// `player` plays the log from its beginning, which also shows the log's losses.
 pub(crate) fn smoothed(
     files: &[PathBuf],
     player: &mut Player,

@@ -12,12 +12,12 @@ use headrace_monitor::report::{DiveReport, NotInspectedReport, Report, RunReport
 
 use crate::terminal;
 
-/// Silence of a sensor from which it is reported, s.
+/// Duration of a sensor's silence from which it is reported, s.
 const SILENT_S: f64 = 5.0;
 /// Maximum number of notes listed.
 const MOST_NOTES: usize = 20;
 
-/// Summary text, in lines of at most `columns` columns if given.
+/// Summary as text. Its lines have at most `columns` columns, if given.
 pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
@@ -105,7 +105,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     text
 }
 
-/// Figures for an engineer: the confidence, the largest hole and the spacing of samples.
+/// Text for engineers: the confidence, the largest hole and the spacing of samples.
 fn spacing(report: &Report) -> String {
     let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
     let sum = &report.summary;
@@ -118,7 +118,7 @@ fn spacing(report: &Report) -> String {
     )
 }
 
-/// Text on packets for a sensor that were dropped unread.
+/// Text on a sensor's packets that were dropped before they were read.
 fn dropped(source: &SourceReport) -> Option<String> {
     let count = source.line.as_ref()?.dropped_packets;
     let line = format!(
@@ -128,8 +128,9 @@ fn dropped(source: &SourceReport) -> Option<String> {
     (count > 0).then_some(line)
 }
 
-/// Text on a sensor's silence, if it is worth a line. A dive without position or sonar already names its
-/// silent sensors.
+/// Text on a sensor's silence, if it deserves a line.
+///
+/// If a dive has no position or no sonar, another line names the silent sensors.
 fn silence(source: &SourceReport) -> Option<String> {
     let id = &source.id;
     match source.silent_at_end_s {
@@ -142,7 +143,7 @@ fn silence(source: &SourceReport) -> Option<String> {
     }
 }
 
-/// Reason for which a dive is no inspection.
+/// Text on the reason for which a dive is no inspection.
 fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     let lacking = why
         .lacking
@@ -166,7 +167,7 @@ fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     }
 }
 
-/// Text on a dive that was never within the tunnel: places of the heads, and settings to check.
+/// Text on a dive that was never within the tunnel. It has the places of the heads, and settings to check.
 fn outside_text(dive: &DiveReport) -> String {
     let place = match (dive.from_m, dive.to_m) {
         (Some(from_m), Some(to_m)) => format!(" from {} to {}", station(from_m), station(to_m)),
@@ -175,20 +176,20 @@ fn outside_text(dive: &DiveReport) -> String {
     format!("NO VERDICTS: the heads were outside the tunnel{place}: check the tether's zero and length_m")
 }
 
-/// Metres by verdict.
+/// Metres by verdict, as text.
 fn metres(judged: &OtherTargetReport) -> String {
     let OtherTargetReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
     metres_text(&LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
 }
 
-/// Lines on the missed and the unsure stretches, along the tunnel: place, problem, action.
+/// Lines on the missed and the unsure stretches, in the order of chainage: place, problem and action.
 fn stretches(report: &Report) -> Vec<String> {
     let fails = |run: &&RunReport| {
         let mut within =
             report.sections.iter().filter(|section| (run.start_m..run.end_m).contains(&section.start_m));
         within.any(|section| section.verdict == "fail")
     };
-    // Sections passed again without a verdict are listed as unsure.
+    // Sections that were passed again and have no verdict are listed as unsure.
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none()).filter(fails);
     let mut all: Vec<(f64, String)> = open.map(|run| (run.start_m, missed(run, report))).collect();
     all.extend(report.unsure.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
@@ -203,7 +204,7 @@ fn missed(run: &RunReport, report: &Report) -> String {
     let back = report.way_home.iter().find(|back| back.run == run.id);
     let action = back
         .map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps, heads)));
-    // The rest passes, or no longer has a verdict.
+    // The rest of the run passes, or no longer has a verdict.
     let of_it = of_it_text(run.failed_m, run.end_m - run.start_m);
     format!(
         "  {} to {}{of_it}  MISSED: {cause}, holes up to {:.2} m{}",
@@ -225,7 +226,7 @@ fn unsure(stretch: &UnsureStretch) -> String {
     format!("  {from} to {to}{of_it}  {what}: {}{helps}", unsure_text(stretch))
 }
 
-/// A line broken to `columns` columns if given. Continuation lines are indented.
+/// A line broken to `columns` columns, if given. Continuation lines are indented.
 pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
     let Some(columns) = columns.filter(|columns| line.chars().count() > *columns) else {
         return vec![line.to_owned()];
@@ -247,7 +248,8 @@ pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// Changes by smoothing: metres by verdict, and a line per run of neighbouring sections with the same change.
+/// Lines on the effect of smoothing: metres by verdict, and a line per run of neighbouring sections with the
+/// same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
     let mut lines = vec![format!(
@@ -276,7 +278,7 @@ fn smoothing(report: &SmoothingReport) -> Vec<String> {
     lines
 }
 
-/// Whether a change continues the run that ends at `end_m`; if so, moves the run's end.
+/// Whether a change continues the run that ends at `end_m`. If so, `end_m` is moved to the new end.
 fn follows(first: &ChangeReport, next: &ChangeReport, end_m: &mut f64) -> bool {
     let verdicts = |change: &ChangeReport| [change.before, change.after].map(verdict_text);
     let goes_on = (next.start_m - *end_m).abs() < 1e-6 && verdicts(first) == verdicts(next);
@@ -294,7 +296,7 @@ fn verdict_text(judged: Option<JudgedReport>) -> &'static str {
     }
 }
 
-/// Largest hole of a run with its standard deviation, m.
+/// Largest hole of a run with its standard deviation, m, as text.
 fn holes(run: impl Iterator<Item = JudgedReport>) -> String {
     let measured = run.filter_map(|judged| Some((judged.hole_m?, judged.hole_sd_m)));
     let largest = measured.max_by(|a, b| a.0.total_cmp(&b.0));

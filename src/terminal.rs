@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Capabilities of an output stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Terminal {
-    /// Colours: a terminal, and neither `NO_COLOR` nor `TERM=dumb`.
+    /// Whether colours are shown: on a terminal with neither `NO_COLOR` nor `TERM=dumb`.
     pub(crate) colour: bool,
-    /// Lines that overwrite themselves: a terminal other than `TERM=dumb`.
+    /// Whether lines can overwrite themselves: on a terminal without `TERM=dumb`.
     pub(crate) overwrites: bool,
 }
 
-/// Sequence that returns to the beginning of the line and clears it.
+/// Escape sequence that returns to the beginning of the line and clears the line.
 pub(crate) const CLEAR: &str = "\r\x1b[K";
 
 static QUIET: AtomicBool = AtomicBool::new(false);
@@ -24,20 +24,22 @@ pub(crate) fn of(stream: &impl IsTerminal) -> Terminal {
     able(stream.is_terminal(), variable("NO_COLOR").as_deref(), variable("TERM").as_deref())
 }
 
-/// Whether `NO_COLOR` and `TERM` allow colours, on any terminal.
+/// Whether `NO_COLOR` and `TERM` allow colours. Whether there is a terminal is not checked.
 pub(crate) fn allows_colour() -> bool {
     let variable = |name: &str| std::env::var(name).ok();
     able(true, variable("NO_COLOR").as_deref(), variable("TERM").as_deref()).colour
 }
 
-/// Whether the locale indicates more than ASCII. Source: POSIX, the order of `LC_ALL`, `LC_CTYPE`, `LANG`.
+/// Whether the locale allows characters beyond ASCII.
+///
+/// Source: POSIX, the order of `LC_ALL`, `LC_CTYPE` and `LANG`.
 pub(crate) fn has_unicode() -> bool {
     let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default().to_lowercase();
     locale.contains("utf-8") || locale.contains("utf8")
 }
 
-/// An empty `NO_COLOR` doesn't count. Source: no-color.org.
+/// Capabilities for these variables. An empty `NO_COLOR` doesn't count. Source: no-color.org.
 fn able(is_terminal: bool, no_color: Option<&str>, term: Option<&str>) -> Terminal {
     let overwrites = is_terminal && term != Some("dumb");
     Terminal { colour: overwrites && no_color.is_none_or(str::is_empty), overwrites }
@@ -53,12 +55,12 @@ pub(crate) fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
 
-/// With `-v` the summary has the figures of an engineer, too.
+/// Sets whether the summary has the figures for engineers, as with `-v`.
 pub(crate) fn be_verbose(verbose: bool) {
     VERBOSE.store(verbose, Ordering::Relaxed);
 }
 
-/// Whether the summary has the figures of an engineer.
+/// Whether the summary has the figures for engineers.
 pub(crate) fn is_verbose() -> bool {
     VERBOSE.load(Ordering::Relaxed)
 }

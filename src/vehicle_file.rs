@@ -1,4 +1,4 @@
-//! Vehicle files: from disk, or attached to a log.
+//! Reads vehicle files from disk or from a log.
 
 use std::path::{Path, PathBuf};
 
@@ -11,19 +11,19 @@ use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 
-/// Reads and parses a vehicle file. Also returns its text.
+/// Reads and parses a vehicle file. Also returns the file's text.
 pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let text = files::read(path)?;
     let vehicle = parse(&path.display().to_string(), &text, &files::beside(path))?;
     Ok((text, vehicle))
 }
 
-/// Vehicle file named by an option, if given, and its source files.
+/// Vehicle file that an option names, if any, and the files that it was read from.
 #[derive(Default)]
 pub(crate) struct Given {
     /// Text and vehicle.
     vehicle: Option<(String, VehicleConfig)>,
-    /// The file itself, and the files that it refers to.
+    /// The vehicle file itself, and the files that it refers to.
     pub(crate) files: Vec<PathBuf>,
 }
 
@@ -35,7 +35,7 @@ impl Given {
         Ok(Self { files: files(path, &vehicle), vehicle: Some((text, vehicle)) })
     }
 
-    /// The given file, or else the one attached to a log; see [`attached`].
+    /// The vehicle file that was given, or else the one attached to a log; see [`attached`].
     pub(crate) fn or_attached(
         self,
         info: &LogInfo,
@@ -46,16 +46,18 @@ impl Given {
     }
 }
 
-/// A vehicle file and the files that it refers to.
+/// Paths of a vehicle file and of the files that it refers to.
 pub(crate) fn files(path: &Path, vehicle: &VehicleConfig) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let others = vehicle.attachments.iter().map(|(name, _)| folder.join(name));
     std::iter::once(path.to_owned()).chain(others).collect()
 }
 
-/// Parses the vehicle file attached to a log. Also returns its text.
+/// Parses the vehicle file attached to a log. Also returns the file's text.
 ///
-/// Errors: none is attached, it can't be read (`losses` are the log's), or it is invalid.
+/// `losses` are the losses of the log.
+///
+/// Errors: no vehicle file is attached, it can't be read, or it is invalid.
 pub(crate) fn attached(
     info: &LogInfo,
     losses: &[String],
@@ -66,7 +68,7 @@ pub(crate) fn attached(
         let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
         Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
     })?;
-    // The path is as if the log were a folder.
+    // The path is built as if the log were a folder.
     let vehicle =
         parse(&format!("{}/{VEHICLE_FILE}", log.display()), &text, &files::attached(&info.attachments))?;
     Ok((text, vehicle))

@@ -1,4 +1,6 @@
-//! Output during a dive: its state, and each missed, unsure or cleared stretch once, as lines or as JSON.
+//! Output during a dive, as lines or as JSON.
+//!
+//! It has the dive's state, and each missed, unsure or cleared stretch once.
 
 use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -17,11 +19,12 @@ use crate::recording_state::RecordingState;
 use crate::screen::Screen;
 use crate::terminal;
 
-/// Interval of state lines that can't be overwritten.
+/// Interval of state lines if they can't be overwritten.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
-/// Interval of state lines that are overwritten, and of those in JSON.
+/// Interval of state lines that are overwritten, and of states in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
-/// Minimum time between the last state line and one for a changed lamp, if lines can't be overwritten.
+/// Minimum time after the last state line before a changed lamp gives a new line. It applies if lines can't
+/// be overwritten.
 const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 
 /// Display of a dive.
@@ -29,7 +32,7 @@ const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 pub(crate) enum Show {
     /// No display.
     Nothing,
-    /// Only by its followers, which use the terminal.
+    /// Display only by followers, which use the terminal.
     Followers,
     /// Lines for people.
     Lines,
@@ -37,7 +40,7 @@ pub(crate) enum Show {
     JsonLines,
 }
 
-/// Shows a dive on stdout, and to the added followers.
+/// Shows a dive on stdout, and passes it to followers.
 pub(crate) struct Watch {
     followers: Vec<Box<dyn Follower>>,
     show: Show,
@@ -50,7 +53,7 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Shows the dive in this way; with `-q` not at all.
+    /// Creates the output for a kind of display. With `-q` there is none.
     pub(crate) fn new(show: Show) -> Self {
         let quiet = terminal::is_quiet() && show != Show::Followers;
         let show = if quiet { Show::Nothing } else { show };
@@ -65,7 +68,7 @@ impl Watch {
         }
     }
 
-    /// Shows no output.
+    /// Creates an output that shows nothing.
     pub(crate) fn quiet() -> Self {
         Self::new(Show::Nothing)
     }
@@ -87,12 +90,13 @@ impl Watch {
         self.show == Show::Lines
     }
 
-    /// Writes a line in order with the others.
+    /// Writes a line, in order with the other lines.
     pub(crate) fn say(&mut self, line: &str) {
         self.print(one_line(line).into_owned());
     }
 
-    /// Makes the output lossy for a dive that can't wait: lines without room on the terminal are dropped.
+    /// Makes the output lossy, for a dive that can't wait. Lines for which the terminal has no room are
+    /// dropped.
     pub(crate) fn live(mut self) -> Self {
         if let Some(printer) = &mut self.printer {
             printer.drop_rather_than_wait();
@@ -134,7 +138,7 @@ impl Watch {
         }
     }
 
-    /// Skips the display of a tick during a jump.
+    /// Takes a tick that belongs to a jump, without showing it.
     pub(crate) fn skipped(&mut self, dive: &Loop) {
         self.followers.iter_mut().for_each(|follower| follower.skipped(dive));
     }
@@ -183,7 +187,7 @@ impl Watch {
         self.shown = None;
     }
 
-    /// Sets the state of the recordings to show from now on.
+    /// Sets the state of the recordings that is to be shown from now on.
     pub(crate) fn recorded(&mut self, state: &RecordingState) {
         self.recorded = *state;
         self.followers.iter_mut().for_each(|follower| follower.recorded(state));
@@ -304,7 +308,7 @@ impl Watch {
         self.print(one_line(&value.to_string()).into_owned());
     }
 
-    /// Writes a printable line.
+    /// Writes a line of printable text.
     fn print(&mut self, text: String) {
         if let Some(printer) = &mut self.printer {
             printer.line(text);
@@ -312,9 +316,10 @@ impl Watch {
     }
 }
 
-/// Time shown for a state: that of its update, so that the same dive gives the same lines wherever ticks end.
+/// Time shown for a state. It is the time of the update, so that the same dive gives the same lines wherever
+/// ticks end.
 ///
-/// Without updates it is the time of the tick.
+/// If there are no updates, it is the time of the tick.
 fn as_of(state: &LiveState) -> MonoNs {
     state.at.filter(|_| !state.is_old()).unwrap_or(state.now)
 }

@@ -1,4 +1,4 @@
-//! Readings of a part of a log, as decoded by the loop.
+//! Collects the readings of a part of a log, as the loop decodes them.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
@@ -16,9 +16,9 @@ const MOST_S: f64 = 1200.0;
 pub(crate) struct Window {
     /// Start.
     pub(crate) from_s: f64,
-    /// End; without it, the longest window that can be held.
+    /// End; `None` for the longest window that can be held.
     pub(crate) to_s: Option<f64>,
-    /// Time of the vehicle at the surface, from and to.
+    /// Beginning and end of the vehicle's time at the surface.
     pub(crate) at_surface_s: Option<[f64; 2]>,
 }
 
@@ -26,20 +26,20 @@ pub(crate) struct Window {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum CollectError {
-    /// The window ends before it begins.
+    /// The end of the window is before its beginning.
     #[error("calibrating: --to {to_s} must be after --from {from_s}")]
     Backwards {
-        /// Its beginning, s.
+        /// Beginning of the window, s.
         from_s: f64,
-        /// Its end, s.
+        /// End of the window, s.
         to_s: f64,
     },
     /// The window is too long to be held.
     #[error("calibrating from {from_s} to {to_s} s: at most {MOST_S} s are allowed; give a shorter window")]
     TooLong {
-        /// Its beginning, s.
+        /// Beginning of the window, s.
         from_s: f64,
-        /// Its end, s.
+        /// End of the window, s.
         to_s: f64,
     },
     /// The log can't be read.
@@ -59,11 +59,11 @@ pub(crate) struct Collected {
     pub(crate) from: MonoNs,
     /// End of the requested part.
     pub(crate) to: MonoNs,
-    /// Time of the vehicle at the surface, from and to.
+    /// Beginning and end of the vehicle's time at the surface.
     pub(crate) at_surface: Option<[MonoNs; 2]>,
     /// Sensors of the vehicle file, by source.
     pub(crate) sensors: Vec<SensorInfo>,
-    /// Readings of that part and of the time at the surface, in order.
+    /// Readings of the requested part and of the time at the surface, in order.
     pub(crate) events: Vec<Event>,
 }
 
@@ -73,7 +73,7 @@ impl Collected {
         self.events.iter().filter(|event| event.received >= self.from && event.received < self.to)
     }
 
-    /// Seconds from the log's first message.
+    /// Time in seconds from the log's first message.
     pub(crate) fn seconds(&self, at: MonoNs) -> f64 {
         at.since(self.first).as_secs_f64()
     }
@@ -95,10 +95,10 @@ impl PacketSource for Until<'_> {
     }
 }
 
-/// Runs a log through the loop up to the end of the window, and keeps the readings within.
+/// Runs a log through the loop up to the end of the window, and keeps the readings in the window.
 ///
-/// `progress` receives the number kept so far. The part before the window runs as well, because the decoders'
-/// state depends on it.
+/// `progress` receives the number of readings kept so far. The part before the window runs as well, because
+/// the decoders' state depends on it.
 ///
 /// Errors: see [`CollectError`].
 pub(crate) fn collect(

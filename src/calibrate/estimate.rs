@@ -1,6 +1,6 @@
 //! Estimates, and the reasons for missing ones.
 
-/// An estimated number, in the unit of its quantity.
+/// An estimated value, in the unit of its quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Estimate {
     /// Value.
@@ -10,8 +10,9 @@ pub(crate) struct Estimate {
 }
 
 impl Estimate {
-    /// Whether it differs from `other` by more than three standard deviations. Among many quantities, two is
-    /// soon reached by chance.
+    /// Whether the estimate differs from `other` by more than three standard deviations.
+    ///
+    /// Among many quantities, two standard deviations are often exceeded by chance.
     pub(crate) fn differs_from(&self, other: f64) -> bool {
         (self.value - other).abs() > 3.0 * self.sd
     }
@@ -21,10 +22,10 @@ impl Estimate {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum NotEstimated {
-    /// No readings of a required kind.
+    /// There are no readings of a required kind.
     #[error("the log has no readings of {what}")]
     Missing {
-        /// The kind.
+        /// The missing kind.
         what: &'static str,
     },
     /// The vehicle never stood still for long enough.
@@ -33,62 +34,62 @@ pub(crate) enum NotEstimated {
          as stationary); it was never stationary for {least_s} s"
     )]
     Moved {
-        /// The quantity that moved.
+        /// Quantity that varied.
         what: &'static str,
-        /// Its range of motion.
+        /// Variation of the quantity.
         span: f64,
-        /// Its unit.
+        /// Unit of the quantity.
         unit: &'static str,
-        /// Largest range that counts as still.
+        /// Largest variation that counts as still.
         limit: f64,
         /// Required duration at rest, s.
         least_s: usize,
     },
-    /// A head has covered too little of the wall.
+    /// A head has seen too little of the wall.
     #[error(
         "no full turn: the head covered only {seen_deg:.0} degrees of wall; at least {least_deg:.0} are \
          needed"
     )]
     LittleWall {
-        /// Sector covered, degrees.
+        /// Sector that the head has seen, degrees.
         seen_deg: f64,
         /// Sector required, degrees.
         least_deg: f64,
     },
-    /// Turning the head about its axis changes nothing.
+    /// The section looks the same whatever the head's angle about its axis.
     #[error(
         "the section looks the same at every angle of the head about its axis (a circle doesn't determine \
          roll): the angle would have a standard deviation of {sd_deg:.1} degrees"
     )]
     Round {
-        /// Remaining standard deviation, degrees.
+        /// Standard deviation that would remain, degrees.
         sd_deg: f64,
     },
-    /// The offset of a single head can't be separated from the vehicle's position.
+    /// The offset of a single head can't be distinguished from the vehicle's position.
     #[error(
         "the offset of a single head can't be distinguished from the vehicle's position; at least two heads \
          are needed"
     )]
     OneHead,
-    /// Another unknown has the same effect.
+    /// An offset has the same effect as another unknown.
     #[error(
         "an offset can't be distinguished from another position or heading of the vehicle: it would have a \
          standard deviation of {sd_m:.3} m"
     )]
     LikePlace {
-        /// Remaining standard deviation, m.
+        /// Standard deviation that would remain, m.
         sd_m: f64,
     },
-    /// A mirrored head would fit as well.
+    /// The opposite sense of rotation fits nearly as well.
     #[error(
         "the opposite sense of rotation fits nearly as well (difference {margin:.0}, needed {needed:.0}): the \
          section is symmetric; put the vehicle well to one side of the centre, within range of the \
          echosounders"
     )]
     Mirror {
-        /// Cost difference of the other way, in squared standard deviations.
+        /// Difference in cost of the opposite sense, in squared standard deviations.
         margin: f64,
-        /// Difference required.
+        /// Difference required for a decision.
         needed: f64,
     },
     /// The wall doesn't match the profile.
@@ -108,12 +109,12 @@ pub(crate) enum NotEstimated {
          {most_pa} is allowed"
     )]
     NotAtSurface {
-        /// Its variation, Pa.
+        /// Variation of the pressure, Pa.
         span_pa: f64,
         /// Largest variation allowed, Pa.
         most_pa: f64,
     },
-    /// The pressure was that under water.
+    /// The pressure is too high for air: the sensor was under water.
     #[error(
         "the depth sensor was under water: the pressure was {mean_pa:.0} Pa; that of air is {least_pa} \
          to {most_pa}"
@@ -126,18 +127,18 @@ pub(crate) enum NotEstimated {
         /// Highest air pressure, Pa.
         most_pa: f64,
     },
-    /// The vehicle's chainage wasn't given.
+    /// The chainage of the vehicle is unknown.
     #[error("the vehicle's chainage is unknown; give --chainage METRES, counted from the portal")]
     NoChainage,
-    /// The time at the surface wasn't given.
+    /// The time at the surface is unknown.
     #[error("the time at the surface is unknown; give --at-surface FROM..TO")]
     NoSurface,
-    /// Shifting a source's timestamps changes nothing.
+    /// The likelihood doesn't depend on a shift of the source's timestamps.
     #[error(
         "the vehicle hardly turned or moved: the latency would have a standard deviation of {sd_ms:.0} ms"
     )]
     Flat {
-        /// Remaining standard deviation, ms.
+        /// Standard deviation that would remain, ms.
         sd_ms: f64,
     },
     /// The likelihood has no maximum within the search range.
@@ -146,7 +147,7 @@ pub(crate) enum NotEstimated {
         /// Search range to either side, ms.
         reach_ms: f64,
     },
-    /// The likelihood is still growing at the end of the search range.
+    /// The likelihood still increases at the late end of the search range.
     #[error(
         "the latency exceeds the file's by {reach_ms:.0} ms or more; set latency_ms = {then_ms:.0}, and \
          calibrate again"
@@ -157,7 +158,7 @@ pub(crate) enum NotEstimated {
         /// Latency at the end of the range, ms.
         then_ms: f64,
     },
-    /// The device answers before its next request, so it can't be that late.
+    /// The device must answer each request before the next one, so it can't be as late as the best fit.
     #[error(
         "{found_ms:.0} ms fits best, but the device answers every {every_ms:.0} ms, so its latency is \
          shorter; look for a delay on its line, or another fault"
@@ -165,7 +166,7 @@ pub(crate) enum NotEstimated {
     Slow {
         /// Most likely latency, ms.
         found_ms: f64,
-        /// Time between its answers, ms.
+        /// Time between the device's answers, ms.
         every_ms: f64,
     },
     /// Ranges don't fit the size of the design profile.
@@ -174,9 +175,9 @@ pub(crate) enum NotEstimated {
          in the vehicle file, or correct the profile there; other values can be estimated only afterwards"
     )]
     Scaled {
-        /// Excess of the ranges, %.
+        /// Relative excess of the ranges, %.
         long_pct: f64,
-        /// Speed of sound without that excess, m/s.
+        /// Speed of sound at which the ranges have no excess, m/s.
         sound_mps: f64,
     },
     /// The filter disagrees with the measurements.
@@ -185,7 +186,7 @@ pub(crate) enum NotEstimated {
          mounts, beams or the profile of the vehicle file are wrong, or the vehicle turned too fast"
     )]
     Disagrees {
-        /// Share of measurements it gates, %.
+        /// Share of measurements that the filter gates, %.
         gated: f64,
         /// Largest share allowed, %.
         most: f64,
@@ -197,7 +198,9 @@ pub(crate) enum NotEstimated {
     NoFilter,
 }
 
-/// Median of some numbers, which it sorts (the upper one of an even count); `None` without any.
+/// Median of some numbers, which are sorted by this function; `None` if there are no numbers.
+///
+/// For an even count, it is the upper of the two in the middle.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()

@@ -1,4 +1,4 @@
-//! All estimates for a vehicle file from a log.
+//! All estimates from a log for a vehicle file.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_monitor::messages::Event;
@@ -13,7 +13,7 @@ use crate::calibrate::still::longest;
 use crate::calibrate::timing::{Lag, lags};
 use crate::calibrate::zero::{self, Zero};
 
-/// Result of each estimator, or the reason for having none.
+/// Result of each estimator, or the reason for which it has none.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Findings {
     /// Mounts of the heads.
@@ -22,7 +22,7 @@ pub(crate) struct Findings {
     pub(crate) surface: Result<Zero, NotEstimated>,
     /// Height of the water's surface above the floor, m.
     pub(crate) level: Result<Zero, NotEstimated>,
-    /// Chainage at which each cable counter reads zero, m, with the file's value.
+    /// Chainage at which each cable counter reads zero, m, and the vehicle file's value.
     pub(crate) tethers: Result<Vec<(Zero, f64)>, NotEstimated>,
     /// Time offsets.
     pub(crate) lags: Result<Vec<Lag>, NotEstimated>,
@@ -71,7 +71,7 @@ impl Findings {
             };
             Ok(zeros.into_iter().map(|zero| (zero, filed_m(&zero))).collect())
         });
-        // Time offsets are estimated with the mounts found for the heads.
+        // The mounts found for the heads are used for estimating the time offsets.
         let sensors = sitting(&collected.sensors, heads.as_ref().ok());
         let sitting = Material { sensors: &sensors, ..in_time };
         let latencies: Vec<_> = vehicle.sensor_configs.iter().map(|sensor| sensor.latency).collect();

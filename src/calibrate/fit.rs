@@ -1,8 +1,8 @@
-//! Robust least squares fit of the vehicle's position and the mounts of its heads to the design profile.
+//! Robust least-squares fit of the vehicle's position and the heads' mounts to the design profile.
 //!
-//! Gauss-Newton, in which each round is a recursive fit: [`Factors`] start with the prior and take one return
-//! after the other. Unknowns that the returns don't determine thus keep the vehicle file's value and
-//! uncertainty.
+//! The method is Gauss-Newton. Each round is a recursive fit: [`Factors`] start with the prior, then include
+//! one return after the other. If the returns don't determine an unknown, it keeps the vehicle file's value
+//! and uncertainty.
 
 use crate::calibrate::estimate::median;
 use crate::calibrate::scan::{EchoScan, HeadScan, Return};
@@ -16,38 +16,49 @@ use headrace_geometry::tunnel::Profile;
 
 /// Number of unknowns common to all heads.
 ///
-/// They are the vehicle's y and z, m; the rotation vector from the inertial unit's attitude to the true one,
-/// radians; and the relative excess of the ranges.
+/// They are the vehicle's y and z, m, the rotation vector from the inertial unit's attitude to the true one,
+/// radians, and the relative excess of the ranges.
 pub(crate) const COMMON: usize = 6;
-/// Unknowns of each head: its angle about its axis, radians; its offsets left and up from the file's position, m.
+/// Number of unknowns of each head.
+///
+/// They are its angle about its axis, radians, and its offsets to the left and upwards from the file's
+/// position, m.
 pub(crate) const OWN: usize = 3;
 
-/// Prior of the vehicle's position: anywhere in the section.
+/// Standard deviation of the prior of the vehicle's position, m: the vehicle may be anywhere in the section.
 const PLACE_SD_M: f64 = 10.0;
-/// Roll and pitch errors of a unit at rest. Source: data sheets of MEMS units, static accuracy 0.2 degrees.
+/// Standard deviation of the roll and pitch errors of a unit at rest, radians.
+///
+/// Source: data sheets of MEMS units, static accuracy 0.2 degrees.
 const TILT_SD_RAD: f64 = 0.2 * DEGREE;
-/// Relative error of a speed of sound from tables: 1 degree of water temperature.
+/// Relative standard deviation of a speed of sound from tables. It corresponds to 1 degree of water
+/// temperature.
 const SCALE_SD: f64 = 0.003;
-/// Errors of a vehicle file's mounts: a tape measure on a round hull, and a head's bracket.
+/// Standard deviation of the angle of a mount in a vehicle file, radians.
+///
+/// It and [`OFFSET_SD_M`] allow for a tape measure on a round hull, and for the bracket of a head.
 pub(crate) const ANGLE_SD_RAD: f64 = 10.0 * DEGREE;
-/// See [`ANGLE_SD_RAD`].
+/// Standard deviation of the position of a mount in a vehicle file, m. See [`ANGLE_SD_RAD`].
 pub(crate) const OFFSET_SD_M: f64 = 0.05;
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
-/// Minimum standard deviation assumed for returns, m: walls are rough.
+/// Minimum standard deviation assumed for returns, m. Walls are at least this rough.
 const LEAST_SCALE_M: f64 = 0.01;
-/// Residuals beyond this many scales are downweighted, or rejected. Source: the usual constants of Huber and
-/// Tukey.
+/// Residuals are weighted less beyond `HUBER` scales, and rejected beyond `TUKEY` scales. Source: the usual
+/// constants of Huber and Tukey.
 const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
-/// Rounds before Tukey's weights: they need a good start.
+/// Number of rounds with Huber's weights. Tukey's weights need a good start.
 const HUBER_ROUNDS: usize = 3;
-/// Largest cost of one piece of wall, and the cost of a grazed or missed one, in squared standard deviations.
+/// Largest cost of one piece of wall, in squared standard deviations. The second value is the cost of a piece
+/// that the beam grazes or misses.
 const MOST_COST: f64 = 9.0;
 const MISSED_COST: f64 = 4.5;
-/// Largest cost of an echosounder: there are few, and they distinguish the sides.
+/// Largest cost of an echosounder's range, in squared standard deviations.
+///
+/// It is high, because there are few echosounders and they distinguish the sides.
 const MOST_ECHO_COST: f64 = 100.0;
-/// Largest rotation of a head in one step, radians.
+/// Largest rotation of a head in one round, radians.
 const MOST_STEP_RAD: f64 = 0.2;
 
 /// Input of a fit.
@@ -57,13 +68,13 @@ pub(crate) struct Problem<'a> {
     pub(crate) profile: &'a Profile,
     /// Noise settings of the sonars.
     pub(crate) settings: &'a Settings,
-    /// The heads, at most as many as there are unknowns for.
+    /// The heads. Their number is limited by the number of unknowns.
     pub(crate) heads: &'a [HeadScan],
     /// Echosounders.
     pub(crate) echoes: &'a [EchoScan],
-    /// Attitude of the vehicle at that time.
+    /// Attitude of the vehicle at the time of the fit.
     pub(crate) attitude: Rot<Tunnel, Body>,
-    /// For each head, whether it turns the opposite way to the file.
+    /// Whether each head turns the opposite way to the file.
     pub(crate) mirrored: &'a [bool],
     /// Every `stride`-th return is used.
     pub(crate) stride: usize,
@@ -76,7 +87,7 @@ pub(crate) struct Fit<const N: usize> {
     pub(crate) x: [f64; N],
     /// Covariance of the unknowns.
     pub(crate) factors: Factors<N>,
-    /// Misfit of returns, echoes and prior, in squared standard deviations.
+    /// Sum of the misfits of returns, echoes and prior, in squared standard deviations.
     pub(crate) cost: f64,
     /// Robust standard deviation of the residuals, m.
     pub(crate) scale_m: f64,
@@ -85,11 +96,12 @@ pub(crate) struct Fit<const N: usize> {
 /// Residual of a return.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual<const N: usize> {
-    /// Number of its head.
+    /// Number of the return's head.
     pub(crate) head: usize,
-    /// Its weight within its piece of wall.
+    /// Weight of the return within its piece of wall.
     pub(crate) share: f64,
-    /// Derivatives, and measured minus expected, m; `None` where the beam grazes or misses the wall.
+    /// Derivatives, and the measured minus the expected range, m; `None` if the beam grazes or misses the
+    /// wall.
     pub(crate) row: Option<([f64; N], f64)>,
 }
 
@@ -108,11 +120,11 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
     }
 }
 
-/// Mount of a head with errors of the angle about its axis and of its position, optionally turning the
+/// Mount of a head after a change of its angle about its axis and of its position. It may also turn the
 /// opposite way.
 pub(crate) fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
-    // Seen from the other side, angles increase in the opposite sense.
+    // A head that faces the other way has its angles in the opposite sense.
     let yaw = if is_mirrored { math::PI } else { 0.0 };
     Mount {
         position: mount.position + Vec3::new(0.0, left_m, up_m),
@@ -138,7 +150,7 @@ impl Problem<'_> {
     pub(crate) fn fit<const N: usize>(&self, start: [f64; N], rounds: usize) -> Fit<N> {
         let known = self.known::<N>();
         let mut prior = start;
-        // The prior of the position is the start. All other priors are the file's values.
+        // The prior of the position is the start of the fit. All other priors are the file's values.
         prior.iter_mut().skip(2).for_each(|slot| *slot = 0.0);
         let mut x = start;
         let mut factors = Factors::independent(known.map(|sd| sd * sd));
@@ -175,7 +187,7 @@ impl Problem<'_> {
         Fit { x, factors, cost, scale_m }
     }
 
-    /// Takes a step, shortened where it would turn a head too far or leave the tunnel.
+    /// Applies a step. The step is shortened if it would turn a head too far or leave the tunnel.
     fn go<const N: usize>(&self, x: &mut [f64; N], step: &[f64; N]) {
         let turns = (0..self.heads.len()).map(|head| at(step, own(head, 0)).abs());
         let most_rad = turns.fold(0.0, f64::max);
@@ -225,7 +237,8 @@ impl Problem<'_> {
         let state = state(x, one.attitude);
         let (mut h, row) = self.common_row(x, &state, &beam, one.range_m, 1.0)?;
         let place = vec::<Tunnel>(&row.h, POSITION);
-        // The beam rotates about the head's axis; its origin stays.
+        // A change of the angle rotates the beam about the head's axis and leaves the origin of the beam
+        // unchanged.
         let swing = vec::<Tunnel>(&row.h, ATTITUDE) + -(state.attitude * offset).cross(&place);
         let [axis, left, up] =
             [rotation * Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
@@ -235,7 +248,7 @@ impl Problem<'_> {
         Some((h, row.residual))
     }
 
-    /// The filter's range update, with derivatives by the unknowns common to all sonars.
+    /// Range update as in the navigation filter, with derivatives by the unknowns common to all sonars.
     fn common_row<const N: usize>(
         &self,
         x: &[f64; N],
@@ -256,7 +269,7 @@ impl Problem<'_> {
         Some((h, row))
     }
 
-    /// Echosounders: derivatives, residual and variance, mount errors included.
+    /// Derivatives, residual and variance of each echosounder. The variance includes the mount's error.
     fn echo_rows<const N: usize>(&self, x: &[f64; N]) -> Vec<([f64; N], f64, f64)> {
         let state = state(x, self.attitude);
         let row = |echo: &EchoScan| {
@@ -290,7 +303,7 @@ impl Problem<'_> {
     }
 }
 
-/// State of the vehicle by the unknowns, with the body's origin in place of the inertial unit.
+/// State of the vehicle for these unknowns. The body's origin takes the place of the inertial unit.
 fn state<const N: usize>(x: &[f64; N], attitude: Rot<Tunnel, Body>) -> State {
     let turn = rotation(Vec3::<Tunnel>::new(at(x, 2), at(x, 3), at(x, 4)));
     State::at_rest(Point3::new(0.0, at(x, 0), at(x, 1)), turn * attitude)
@@ -300,7 +313,7 @@ fn state<const N: usize>(x: &[f64; N], attitude: Rot<Tunnel, Body>) -> State {
 fn scale<const N: usize>(residuals: &[Residual<N>]) -> f64 {
     let mut sizes: Vec<f64> =
         residuals.iter().filter_map(|residual| residual.row.map(|(_, off_m)| off_m.abs())).collect();
-    // Half of normally distributed numbers lie within 0.6745 standard deviations.
+    // Half of all normally distributed numbers lie within 0.6745 standard deviations.
     (median(&mut sizes).unwrap_or(0.0) / 0.6745).max(LEAST_SCALE_M)
 }
 
@@ -316,7 +329,7 @@ fn weight(off: f64, is_near: bool) -> f64 {
     }
 }
 
-/// Whether a residual of this size is an outlier at this scale.
+/// Whether a residual of this size, m, is an outlier at this scale, m.
 pub(crate) fn is_outlier(off_m: f64, scale_m: f64) -> bool {
     off_m.abs() > TUKEY * scale_m
 }

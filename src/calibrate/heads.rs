@@ -1,4 +1,5 @@
-//! Mounts of the heads, from their turns while the vehicle stands still in a tunnel of known profile.
+//! Estimates the mounts of the heads. Their turns are used while the vehicle stands still in a tunnel of
+//! known profile.
 
 use crate::calibrate::estimate::{Estimate, NotEstimated, median};
 use crate::calibrate::fit::{ANGLE_SD_RAD, COMMON, Fit, OFFSET_SD_M, OWN, Problem, is_outlier, moved, own};
@@ -10,45 +11,47 @@ use headrace_geometry::frames::{Mount, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::head::MAX_HEADS;
 
-/// Minimum sector of wall seen by a head to be calibrated, degrees.
+/// Minimum sector that a head must have seen to be calibrated, degrees.
 const LEAST_SEEN_DEG: f64 = 120.0;
-/// Largest median residual, m. Beyond it the wall doesn't match the profile.
+/// Largest median residual, m. With a larger one the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;
-/// Largest remaining share of the file's uncertainty for an unknown to count as estimated.
+/// An unknown counts as estimated if at most this share of the file's uncertainty remains.
 const TOLD: f64 = 0.3;
-/// Cost difference for a clear sense of rotation, in squared standard deviations. Chance exceeds it once in
-/// 10,000.
+/// Cost difference at which the sense of rotation is clear, in squared standard deviations. Chance exceeds it
+/// once in 10,000 times.
 const CLEAR: f64 = 15.0;
-/// Search of a head's angle: number of starts, rounds from each, and stride of the returns.
+/// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The
+/// last value is the number of rounds of every other fit.
 const STARTS: usize = 24;
 const START_ROUNDS: usize = 2;
 const START_STRIDE: usize = 5;
 const ROUNDS: usize = 12;
 
-/// Estimates for one head, against the vehicle file.
+/// Estimates for one head, compared with the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Head {
-    /// Source.
+    /// Number of the head's source.
     pub(crate) source: usize,
     /// Mount in the vehicle file.
     pub(crate) filed: Mount,
-    /// Estimated mount; the file's if there is no estimate.
+    /// Estimated mount; the file's mount if there is no estimate.
     pub(crate) found: Mount,
-    /// Sector in which it received returns, degrees.
+    /// Sector from which the head received returns, degrees.
     pub(crate) seen_deg: f64,
-    /// Returns used.
+    /// Number of returns used.
     pub(crate) used: usize,
-    /// Returns rejected as outliers, or because they grazed the wall.
+    /// Number of returns rejected as outliers, or because they grazed the wall.
     pub(crate) rejected: usize,
     /// Root mean square residual of the returns used, m.
     pub(crate) rms_m: f64,
-    /// Angle about its axis to be added to the file's, radians, in the estimated sense of rotation.
+    /// Angle to be added to the head's angle about its axis, radians, in the estimated sense of rotation.
     pub(crate) angle_rad: Result<Estimate, NotEstimated>,
     /// Offset to the left of the file's position, relative to the other heads, m.
     pub(crate) left_m: Result<Estimate, NotEstimated>,
     /// Offset upwards from the file's position, relative to the other heads, m.
     pub(crate) up_m: Result<Estimate, NotEstimated>,
-    /// Whether it turns the opposite way (faces aft where the file has forward).
+    /// Whether the head turns the opposite way. It then faces aft instead of forward, or forward instead of
+    /// aft.
     pub(crate) is_mirrored: Result<bool, NotEstimated>,
 }
 
@@ -57,9 +60,9 @@ pub(crate) struct Head {
 pub(crate) struct Heads {
     /// Time at rest.
     pub(crate) still: Still,
-    /// y and z of the body's origin, m.
+    /// y and z of the vehicle body's origin, m.
     pub(crate) place_m: [Estimate; 2],
-    /// Relative excess of the ranges over those of the profile.
+    /// Relative excess of the ranges over those expected from the profile.
     pub(crate) scale: Estimate,
     /// Median of the absolute residuals, m.
     pub(crate) median_m: f64,
@@ -67,7 +70,7 @@ pub(crate) struct Heads {
     pub(crate) heads: Vec<Head>,
 }
 
-/// Calibrates the heads from the longest time in which the vehicle stood still.
+/// Calibrates the heads from the longest time at rest.
 ///
 /// Errors: there is no such time, or the wall doesn't match the profile.
 pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, NotEstimated> {
@@ -91,7 +94,7 @@ pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, NotEstimated> {
     Ok(found)
 }
 
-/// A head that has seen too little of the wall.
+/// Result for a head that has seen too little of the wall.
 fn unseen(head: &HeadScan) -> Head {
     let seen_deg = head.seen_rad().to_degrees();
     let why = NotEstimated::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG };
@@ -159,7 +162,7 @@ fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> 
     Ok(Heads { still, place_m: [y, z], scale, median_m, heads })
 }
 
-/// Position of the vehicle by the echosounders, or else the centre of the section.
+/// Position of the vehicle, from the echosounders; without them, the centre of the section.
 fn first_place(material: &Material<'_>, scan: &Scan) -> [f64; 2] {
     let start = material.profile.reference();
     let echoes = scan.echoes.iter().map(|echo| Echo { mount: echo.mount, range_m: echo.range_m });
@@ -185,7 +188,7 @@ fn problem<'a>(
     }
 }
 
-/// Fit of one head alone: its unknowns and the common ones.
+/// Fit of one head alone. Its unknowns are the common ones and those of the head.
 type Guess = Fit<{ COMMON + OWN }>;
 
 /// Best fit of one head alone, over all angles.
@@ -210,7 +213,7 @@ fn search(
     problem(material, scan, heads, &mirrored, 1).fit(start, ROUNDS)
 }
 
-/// Fits all heads together, starting from the fit of each alone.
+/// Fits all heads together. The fit of each head alone is the start.
 fn joint<const N: usize>(
     material: &Material<'_>,
     scan: &Scan,
@@ -249,11 +252,11 @@ struct Senses {
 }
 
 impl Senses {
-    /// Chooses the senses of rotation that fit best, one head at a time; the file's if none is clearly
-    /// better.
+    /// Chooses the senses of rotation that fit best, one head at a time. If none is clearly better, keeps the
+    /// file's.
     ///
-    /// In a symmetric section, a vehicle on the other side with all heads turning the opposite way looks the
-    /// same. That case is tried, too.
+    /// In a symmetric section, there is a second solution: the vehicle is on the other side, and all heads
+    /// turn the opposite way. It is tried, too.
     fn choose<const N: usize>(material: &Material<'_>, scan: &Scan, guesses: &[[Guess; 2]]) -> Self {
         let count = scan.heads.len();
         let cost = |mirrored: &[bool]| joint::<N>(material, scan, guesses, mirrored).cost;
@@ -293,7 +296,7 @@ impl Senses {
     }
 }
 
-/// A weighted sum of unknowns.
+/// Estimate of a weighted sum of unknowns.
 fn estimate<const N: usize>(fit: &Fit<N>, parts: &[(usize, f64)]) -> Estimate {
     let mut h = [0.0; N];
     let mut value = 0.0;
@@ -334,7 +337,7 @@ fn offset<const N: usize>(
 }
 
 impl Heads {
-    /// Height above the tunnel's floor of a point `up_m` from the body's origin, m.
+    /// Height above the tunnel's floor, m, of a point at `up_m` from the body's origin, m.
     pub(crate) fn height_m(&self, up_m: Vec3<headrace_geometry::frames::Tunnel>) -> Estimate {
         let [_, z] = self.place_m;
         Estimate { value: z.value + up_m.z(), sd: z.sd }

@@ -1,4 +1,4 @@
-//! Input of the calibration.
+//! Input data of the calibration.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
@@ -7,7 +7,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorInfo;
 
-/// Readings, and the vehicle file's description of their sensors.
+/// Readings of a log, with the sensors and settings that the vehicle file describes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Material<'a> {
     /// Design profile.
@@ -23,7 +23,7 @@ pub(crate) struct Material<'a> {
 }
 
 impl<'a> Material<'a> {
-    /// Readings received from `from` to before `to`, with their sensors.
+    /// Readings received from `from` until before `to`, each with its sensor.
     pub(crate) fn during(
         &self,
         from: MonoNs,

@@ -75,7 +75,7 @@ pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     })
 }
 
-/// Checks that the options match the log.
+/// Checks that the options fit the log.
 ///
 /// Errors: the chainage isn't in the tunnel, or the window isn't in the log.
 fn check(args: &Calibrate, vehicle: &VehicleConfig, player: &Player) -> Result<(), Failure> {

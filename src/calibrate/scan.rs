@@ -1,4 +1,4 @@
-//! Ranges to the wall while the vehicle stood still.
+//! Gathers ranges to the wall from a time at rest.
 
 use std::collections::BTreeMap;
 
@@ -13,33 +13,35 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Returns within this angle see the same roughness of the wall, so together they count as one.
+/// Angle of one piece of wall, radians.
+///
+/// All returns from it share the same roughness, so together they count as one.
 pub(super) const SAME_WALL_RAD: f64 = TAU / SECTORS as f64;
 const SECTORS: usize = 120;
-/// Maximum number of returns used per piece of wall. More add no information.
+/// Maximum number of returns used per piece of wall. Further returns add no information.
 const MOST_OF_A_SECTOR: usize = 8;
 
 /// A return of a head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Return {
-    /// Head angle reported, in its frame, radians.
+    /// Reported angle in the frame of the head, radians.
     pub(crate) angle_rad: f64,
     /// Range at the site's speed of sound, m.
     pub(crate) range_m: f64,
-    /// Attitude of the vehicle at that time.
+    /// Attitude of the vehicle at the time of the return.
     pub(crate) attitude: Rot<Tunnel, Body>,
-    /// Its weight within its piece of wall.
+    /// Weight of the return within its piece of wall.
     pub(crate) share: f64,
 }
 
 /// All returns of a head.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct HeadScan {
-    /// The source.
+    /// Number of the head's source.
     pub(crate) source: usize,
     /// Mount in the vehicle file.
     pub(crate) mount: Mount,
-    /// Its returns.
+    /// Returns of the head.
     pub(crate) returns: Vec<Return>,
 }
 
@@ -48,7 +50,7 @@ pub(crate) struct HeadScan {
 pub(crate) struct EchoScan {
     /// Mount in the vehicle file.
     pub(crate) mount: Mount,
-    /// Median of its ranges, at the site's speed of sound, m.
+    /// Median of the echosounder's ranges, at the site's speed of sound, m.
     pub(crate) range_m: f64,
 }
 
@@ -59,12 +61,12 @@ pub(crate) struct Scan {
     pub(crate) attitude: Rot<Tunnel, Body>,
     /// Heads that detected the wall.
     pub(crate) heads: Vec<HeadScan>,
-    /// Echosounders that detected it.
+    /// Echosounders that detected the wall.
     pub(crate) echoes: Vec<EchoScan>,
 }
 
 impl HeadScan {
-    /// Sector of wall that it has seen, radians of its turn.
+    /// Sector of the head's turn in which it has seen wall, radians.
     pub(crate) fn seen_rad(&self) -> f64 {
         let mut seen = [false; SECTORS];
         for one in &self.returns {

@@ -1,4 +1,6 @@
-//! Detects when the vehicle stood still, second by second: by its attitude, cable, depth and echosounders.
+//! Finds the time for which the vehicle stood still, second by second.
+//!
+//! Attitude, cable, depth and echosounders show whether it moved.
 
 use std::collections::BTreeMap;
 
@@ -11,9 +13,10 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Level, Reading};
 
-/// Averaging time of the medians, so that noise and outliers don't count as motion.
+/// Interval for which medians are formed. Noise and outliers thus don't count as motion.
 const BIN: DurNs = DurNs(1_000_000_000);
-/// Minimum length of a time at rest, and longest part used, in bins. More adds no information.
+/// Minimum length of a time at rest, and the longest part of it that is used, in bins. A longer part adds no
+/// information.
 const LEAST: usize = 3;
 const MOST: usize = 120;
 
@@ -36,7 +39,7 @@ impl Sign {
         }
     }
 
-    /// Largest range of the quantity at rest, and its unit.
+    /// Largest variation of the quantity at rest, and the quantity's unit.
     fn limit(self) -> (f64, &'static str) {
         match self {
             Self::Cable => (0.05, "m"),
@@ -51,7 +54,7 @@ impl Sign {
 pub(crate) struct Still {
     /// First receive time.
     pub(crate) from: MonoNs,
-    /// End of the receive times, exclusive.
+    /// Time before which the last reading was received.
     pub(crate) to: MonoNs,
 }
 
@@ -64,7 +67,7 @@ struct Channel {
     by_bin: Vec<Option<f64>>,
 }
 
-/// Longest part in which the vehicle stood still; the first of equally long ones.
+/// Longest part in which the vehicle stood still. Of equally long ones, the first.
 ///
 /// Errors: there is no attitude or no return, or the vehicle moved all the time.
 pub(crate) fn longest(material: &Material<'_>) -> Result<Still, NotEstimated> {
@@ -106,7 +109,7 @@ fn bins_long(bins: usize) -> DurNs {
     DurNs(BIN.0.saturating_mul(i64::try_from(bins).unwrap_or(i64::MAX)))
 }
 
-/// Number of bins from this one on in which nothing moves and the wall is detected.
+/// Number of bins, from this one on, in which nothing moves and the wall is detected.
 fn length_from(from: usize, channels: &[Channel], heard: &[bool]) -> usize {
     let mut spans: Vec<Option<(f64, f64)>> = vec![None; channels.len()];
     let mut length = 0;
@@ -129,7 +132,7 @@ fn widened(span: Option<(f64, f64)>, value: f64) -> (f64, f64) {
     span.map_or((value, value), |(least, most)| (least.min(value), most.max(value)))
 }
 
-/// Reason with the quantity that moved most, relative to its limit.
+/// Error with the quantity that moved most, relative to its limit.
 fn moved(channels: &[Channel]) -> NotEstimated {
     let mut worst = (Sign::Attitude, 0.0);
     for channel in channels {
@@ -179,7 +182,7 @@ fn channels(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<Channel>
     raw.into_values().map(channel).collect()
 }
 
-/// Motion values of a reading: up to three numbers; unused ones are not finite.
+/// Up to three numbers from a reading that show motion. Unused numbers are NaN.
 fn shows(
     material: &Material<'_>,
     sensor: &SensorInfo,

@@ -8,8 +8,9 @@ use crate::calibrate::findings::Findings;
 use crate::calibrate::heads::Head;
 use crate::calibrate::zero::Zero;
 
-/// Largest relative scale error of ranges accepted for the profile: three times the error of tabulated speeds
-/// of sound.
+/// Largest relative error of the ranges' scale at which the other estimates are valid.
+///
+/// It is three times the error of tabulated speeds of sound.
 const MOST_SCALE: f64 = 0.01;
 
 /// A value in the unit of its row.
@@ -34,13 +35,13 @@ pub(crate) enum Value {
 /// An estimated quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Found {
-    /// Id of the sensor, or table of the file.
+    /// Id of the sensor, or table of the vehicle file.
     pub(crate) of: String,
     /// Quantity.
     pub(crate) what: &'static str,
     /// Unit; empty if there is none.
     pub(crate) unit: &'static str,
-    /// Decimals shown.
+    /// Number of decimals to print.
     pub(crate) decimals: usize,
     /// Value in the file, and estimate.
     pub(crate) value: Value,
@@ -49,7 +50,7 @@ pub(crate) struct Found {
 /// A quantity that the log doesn't determine.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Open {
-    /// Id of the sensor, or table of the file.
+    /// Id of the sensor, or table of the vehicle file.
     pub(crate) of: String,
     /// Quantity.
     pub(crate) what: &'static str,
@@ -57,14 +58,14 @@ pub(crate) struct Open {
     pub(crate) why: NotEstimated,
 }
 
-/// All estimates against a vehicle file.
+/// All estimates compared with a vehicle file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Table {
     /// Estimated quantities.
     pub(crate) found: Vec<Found>,
     /// Quantities that the log doesn't determine.
     pub(crate) open: Vec<Open>,
-    /// Tables of the vehicle file with their new lines.
+    /// Tables of the vehicle file, each with its changed lines.
     pub(crate) lines: Vec<(String, Vec<String>)>,
 }
 
@@ -93,8 +94,9 @@ impl Table {
         table
     }
 
-    /// Lists the speed of sound if ranges don't fit the profile's size. All other values were then fitted to
-    /// a wrong wall, and must not be changed.
+    /// If ranges don't fit the profile's size, lists the speed of sound and removes all other lines.
+    ///
+    /// The other values were then fitted to the wrong wall, so the file must keep its own.
     fn scale(&mut self, vehicle: &VehicleConfig, findings: &Findings) {
         let Ok(heads) = &findings.heads else { return };
         let Estimate { value, sd } = heads.scale;
@@ -105,7 +107,7 @@ impl Table {
         }
     }
 
-    /// Whether there is an error that no line of the vehicle file corrects.
+    /// Whether there is an error that no changed line of the vehicle file corrects.
     pub(crate) fn is_amiss(&self) -> bool {
         let amiss = |why: &NotEstimated| {
             matches!(
@@ -120,7 +122,7 @@ impl Table {
         self.open.push(Open { of: of.to_owned(), what, why });
     }
 
-    /// Adds a number, or the reason for its absence. Returns whether the file should be changed.
+    /// Adds a number, or the reason for which there is none. Returns whether the file should be changed.
     fn number(
         &mut self,
         of: &str,
@@ -200,7 +202,7 @@ impl Table {
         let left = self.number(&id, ("left", "m", 3), at.y(), head.left_m.map(from(at.y())));
         let up = self.number(&id, ("up", "m", 3), at.z(), head.up_m.map(from(at.z())));
         if left || up {
-            // Values that don't differ stay as written.
+            // A coordinate that doesn't differ stays as written in the file.
             let y_m = if left { head.found.position.y() } else { at.y() };
             let z_m = if up { head.found.position.z() } else { at.z() };
             self.line(&sensor(&id), format!("position_m = {}", triple([at.x(), y_m, z_m], 3)));
@@ -216,7 +218,8 @@ impl Table {
             let id = id(vehicle, zero.source);
             let found = zero.found;
             self.number(&id, ("chainage at zero", "m", 3), *file_m, Ok(found));
-            // A surveyed position outweighs the uncertainty left by the cable's slack.
+            // The line is always listed: a surveyed position is better than the file's value, whatever
+            // uncertainty the cable's slack leaves.
             self.line(&sensor(&id), format!("zero_at_m = {}", number(found.value, 3)));
         }
     }
@@ -232,7 +235,7 @@ impl Table {
             let file_ms = latency.map_or(0.0, |latency| latency.as_secs_f64() * 1e3);
             let found = lag.offset_s.map(|of| Estimate { value: file_ms + of.value * 1e3, sd: of.sd * 1e3 });
             self.number(&id, ("latency", "ms", 1), file_ms, found);
-            // A latency is positive.
+            // Only a positive latency can be set in the file.
             if let Ok(found) = found
                 && found.value > 0.0
                 && found.differs_from(file_ms)
@@ -251,7 +254,7 @@ fn sensor(id: &str) -> String {
     format!("sensors.{id}")
 }
 
-/// A number with only the decimals it needs, and no negative zero.
+/// A number with only the decimals that it needs, and without a negative zero.
 fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
@@ -268,7 +271,7 @@ mod tests {
     use super::{number, triple};
 
     #[test]
-    fn numbers_are_short() {
+    fn numbers_have_no_trailing_zeros_or_negative_zero() {
         assert_eq!(triple([0.551, -0.000_2, 2.0], 3), "[0.551, 0, 2]");
         assert_eq!((number(101_300.4, 0), number(-2.10, 2)), ("101300".to_owned(), "-2.1".to_owned()));
     }

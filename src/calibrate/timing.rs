@@ -1,7 +1,7 @@
-//! Latency of each source, by the likelihood of the whole log.
+//! Estimates the latency of each source from the likelihood of the whole log.
 //!
-//! The filter runs with the timestamps of one source shifted, to find the shift that makes all innovations
-//! together most likely.
+//! The filter runs with one source's timestamps shifted. The best shift makes all innovations together most
+//! likely.
 
 use crate::calibrate::estimate::{Estimate, NotEstimated};
 use crate::calibrate::material::Material;
@@ -12,40 +12,43 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorKind;
 
-/// Search range of offsets to either side, and its step, s.
+/// Search range of time offsets to either side, and the step of the search, s.
 const REACH_S: f64 = 0.2;
 const COARSE_S: f64 = 0.1;
-/// Range of steps around the best offset, s: within two standard deviations, unless the curve is nearly flat
-/// or rough.
+/// Allowed steps around the best offset, s.
+///
+/// A step is at most two standard deviations, unless the curve is nearly flat or rough.
 const FINE_S: core::ops::RangeInclusive<f64> = 0.01..=0.05;
-/// Likelihood gain above which a source is corrected before the others are examined: five standard
-/// deviations.
+/// Gain in likelihood above which a source is corrected before the others are examined. It corresponds to
+/// five standard deviations.
 const CLEAR: f64 = 25.0;
 /// Largest standard deviation of an offset to be reported, s.
 const TOLD_S: f64 = 0.03;
-/// Tolerance for a latency that appears negative, s.
+/// Tolerance for a latency that seems negative, s.
 const EARLY_S: f64 = 0.01;
-/// Largest share of gated measurements of a filter that follows the vehicle.
+/// Largest share of gated measurements at which the filter still follows the vehicle.
 const MOST_GATED: f64 = 0.2;
-/// Minimum number of readings of a source, and longest part of a log used; its beginning is enough.
+/// Minimum number of readings of a source, and the longest part of a log that is used. The beginning of a log
+/// is enough.
 const LEAST_READINGS: usize = 50;
 const MOST: DurNs = DurNs(600_000_000_000);
 
-/// Delay of a source's values beyond the vehicle file's latency.
+/// Delay of a source's values beyond the latency in the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lag {
     /// Source.
     pub(crate) source: usize,
-    /// Offset to be added to its latency, s.
+    /// Offset to be added to the latency, s.
     pub(crate) offset_s: Result<Estimate, NotEstimated>,
 }
 
 /// Estimates the lag of each source that navigation uses.
 ///
-/// `latencies` are those of the vehicle file, by source, which the events' times of validity already include.
-/// `progress` is called before each run of the filter. Sources that are clearly late are corrected first, the
-/// clearest first: while one is wrong, the others seem early. No source can be early by more than its
-/// latency.
+/// `latencies` are those of the vehicle file, by source. The events' times of validity already include them.
+/// `progress` is called before each run of the filter.
+///
+/// Sources that are clearly late are corrected first, beginning with the clearest one: as long as one source
+/// is late, the others seem early. No source can be early by more than its latency.
 ///
 /// Errors: the filter never gave a fix.
 pub(crate) fn lags(
@@ -99,10 +102,10 @@ pub(crate) fn lags(
     Ok(lags)
 }
 
-/// Widens the standard deviations if a source seems early by several of its own.
+/// Widens all standard deviations if a source seems early by several of its standard deviations.
 ///
-/// No source is early, so the cause is something other than a time offset: a beam narrower than assumed, or a
-/// mount.
+/// No source is early. The cause is then something other than a time offset, such as a beam narrower than
+/// assumed, or a mount.
 fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
     let early = |lag: &Lag| {
         let latency_s = latencies.get(lag.source).map_or(0.0, |latency| latency.as_secs_f64());
@@ -114,23 +117,24 @@ fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
     }
 }
 
-/// A parabola fitted to the likelihood over a source's shift, relative to its current one.
+/// A parabola fitted to the likelihood as a function of a source's shift, relative to its current shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Curve {
     /// Most likely shift, s.
     best_s: f64,
     /// Standard deviation, s.
     sd_s: f64,
-    /// Gain in likelihood there, as counted by [`headrace_fusion::filter::sources::Consistency::surprise`].
+    /// Gain in likelihood at the best shift, in the unit of
+    /// [`headrace_fusion::filter::sources::Consistency::surprise`].
     gain: f64,
 }
 
-/// Repeated runs of the filter over the log.
+/// Repeated runs of the filter over the log, with different shifts.
 struct Runs<'a, 'b> {
     material: &'a Material<'a>,
     events: &'a [Event],
     shifts_s: Vec<f64>,
-    /// For each source: whether the likelihood was clearly best at the late end of the range.
+    /// Whether the likelihood of each source was clearly best at the late end of the search range.
     later: Vec<bool>,
     /// Share of measurements gated in the last run.
     gated: f64,
@@ -152,7 +156,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         }
     }
 
-    /// The sources used by navigation that have enough readings.
+    /// Sources that navigation uses and that have enough readings.
     fn sources(&self) -> Vec<usize> {
         let mut counts = vec![0_usize; self.material.sensors.len()];
         for event in self.events {
@@ -171,7 +175,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         self.later.get(source).copied().unwrap_or(false)
     }
 
-    /// An offset, unless a device would then answer after its next request.
+    /// The offset, unless the device would then answer after its next request.
     fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, NotEstimated> {
         let answers = |kind: SensorKind| matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
         let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));
@@ -196,11 +200,11 @@ impl<'a, 'b> Runs<'a, 'b> {
         }
     }
 
-    /// Runs the filter; `None` if it has no estimate at the end, or the likelihood isn't finite.
+    /// Runs the filter. `None` if the filter has no estimate at the end, or if the likelihood isn't finite.
     fn surprise(&mut self) -> Option<f64> {
         (self.progress)();
         let Material { profile, site, mut settings, sensors, .. } = *self.material;
-        // Readings shifted back in time must not be too late for the window.
+        // A reading shifted back in time must still fit into the filter's window.
         settings.learns = false;
         settings.window = settings.window + DurNs::from_secs_f64(REACH_S + COARSE_S);
         let mut filter = FilterNavigation::new(profile.clone(), site, settings);
@@ -231,7 +235,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         surprise
     }
 
-    /// The parabola through the best point of a coarse grid and its neighbours.
+    /// Parabola through the best point of a coarse grid and the two points beside it.
     fn coarse(&mut self, source: usize, base: f64) -> Option<Curve> {
         let mut points = vec![(0.0, base)];
         for by_s in [-COARSE_S, COARSE_S, -REACH_S, REACH_S] {
@@ -249,7 +253,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         parabola(points.get(best - 1..=best + 1)?, base)
     }
 
-    /// A parabola fitted to five points around the current shift.
+    /// A parabola fitted to the likelihood at five points around the current shift.
     fn fine(&mut self, source: usize, base: f64, sd_s: f64) -> Option<Curve> {
         let step_s = (2.0 * sd_s).clamp(*FINE_S.start(), *FINE_S.end());
         let mut points = vec![(0.0, base)];
@@ -281,11 +285,11 @@ impl<'a, 'b> Runs<'a, 'b> {
     }
 }
 
-/// Least-squares parabola; `None` if it has no minimum.
+/// Least-squares parabola; `None` if the parabola has no minimum.
 ///
-/// Twice the log-likelihood falls by 1 in one standard deviation, so its second derivative is 2 / sd^2.
+/// Twice the log-likelihood falls by 1 within one standard deviation, so its second derivative is 2 / sd^2.
 fn parabola(points: &[(f64, f64)], base: f64) -> Option<Curve> {
-    // In units of the farthest point, so that the sums are of similar size.
+    // x is scaled by the farthest point, so that the sums have similar sizes.
     let unit = points.iter().map(|(x, _)| x.abs()).fold(0.0, f64::max);
     let mut m = nalgebra::Matrix3::<f64>::zeros();
     let mut v = nalgebra::Vector3::<f64>::zeros();
@@ -308,7 +312,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn early_source_widens_all_standard_deviations() {
+    fn source_that_seems_early_widens_all_standard_deviations() {
         let lag = |source, value, sd| Lag { source, offset_s: Ok(Estimate { value, sd }) };
         let latencies = [DurNs::from_secs_f64(0.01); 2];
         let sds = |mut lags: [Lag; 2]| {

@@ -84,7 +84,7 @@ fn row(found: &Found) -> String {
     }
 }
 
-/// Lines for the vehicle file, each sensor's under a heading with its id.
+/// Lines for the vehicle file. A heading with the sensor's id precedes the lines of each sensor.
 fn toml(table: &Table) -> String {
     let mut text = String::new();
     for (of, lines) in &table.lines {

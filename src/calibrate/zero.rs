@@ -16,20 +16,20 @@ use headrace_sensor::reading::Reading;
 /// Largest variation of pressure at the surface: 5 cm of water.
 const MOST_SPAN_PA: f64 = 500.0;
 
-/// A zero of one source.
+/// Estimated zero of one source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Zero {
     /// Source.
     pub(crate) source: usize,
-    /// Estimate.
+    /// Estimated value.
     pub(crate) found: Estimate,
     /// Number of readings used.
     pub(crate) readings: usize,
 }
 
-/// Pressure at the surface, Pa: mean of the first depth sensor from `from` to before `to`.
+/// Pressure at the surface, Pa: mean of the first depth sensor from `from` until before `to`.
 ///
-/// Its standard deviation is that of one reading, since waves and drift don't average out.
+/// The standard deviation is that of one reading, since waves and drift don't average out.
 ///
 /// Errors: the pressure is missing, varied too much, or isn't that of air.
 pub(crate) fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Result<Zero, NotEstimated> {
@@ -64,9 +64,9 @@ pub(crate) fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Resu
 
 /// Height of the water's surface above the tunnel's floor, m.
 ///
-/// It comes from the first depth sensor and the height that the heads give.
+/// It follows from the first depth sensor and from the height that the heads give.
 ///
-/// `surface_pa` overrides the file's pressure at the surface.
+/// `surface_pa` replaces the file's pressure at the surface.
 ///
 /// Errors: there is no pressure, or no attitude.
 pub(crate) fn water_level(
@@ -105,7 +105,7 @@ pub(crate) fn water_level(
     Ok(Zero { source, found: Estimate { value, sd }, readings })
 }
 
-/// Chainage at which each cable counter reads zero, m, from a time at rest at `chainage_m`.
+/// Chainage at which each cable counter reads zero, m. The vehicle is at rest at `chainage_m`.
 ///
 /// Errors: there is no cable counter.
 pub(crate) fn tethers(
@@ -129,7 +129,7 @@ pub(crate) fn tethers(
         return Err(NotEstimated::Missing { what: "a cable counter" });
     }
     let settings = &material.settings;
-    // Slack is constant at rest, so it doesn't average out.
+    // At rest the cable's slack is constant, so its error doesn't average out.
     let sd_m = math::hypot(settings.tether_sd_m, settings.slack.reach);
     let zero = |(source, quantum_m, mut lengths): (usize, f64, Vec<f64>)| Zero {
         source,

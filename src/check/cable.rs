@@ -1,4 +1,4 @@
-//! Cable accuracy that results from counter steps, slack and speed.
+//! Accuracy of the cable's chainage, from counter steps, slack and speed.
 
 use headrace_config::Document;
 use headrace_sampling::margin::ExpectedErrors;
@@ -6,21 +6,22 @@ use headrace_sensor::device::Sense;
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
 use serde_json::{Value, json};
 
-/// Cable accuracy of a vehicle with a counter and the filter.
+/// Accuracy of the cable's chainage, for a vehicle with a counter and the filter.
 pub(super) struct Cable {
-    /// Smallest change of the chainage, m; `None` if each reading states it.
+    /// Smallest change of the chainage, m; `None` if each reading states its own.
     step_m: Option<f64>,
     /// Standard deviation of the slack, m, and its time constant, s.
     slack: [f64; 2],
-    /// Planned speed, or else the largest one, m/s; standard deviation of a hole at that speed, and largest
-    /// hole that passes, m.
+    /// Speed, m/s, standard deviation of a hole at this speed, and largest hole that passes, m.
+    ///
+    /// The speed is the planned one, or else the largest one.
     at_speed: Option<[f64; 3]>,
-    /// Keys missing from the file.
+    /// Keys that the vehicle file doesn't have.
     missing: Vec<String>,
 }
 
 impl Cable {
-    /// Cable accuracy for the errors between passes, and for the largest speed, m/s.
+    /// Cable accuracy. `v_max_mps` is the largest speed, m/s.
     ///
     /// `None` without a counter or without the filter.
     pub(super) fn of(
@@ -33,7 +34,7 @@ impl Cable {
         let step_m = vehicle.counter?.step_m;
         let planned_mps = Some(vehicle.planned_speed_mps).filter(|planned| *planned > 0.0);
         let at_speed = errors.zip(planned_mps.or(v_max_mps)).map(|(errors, speed_mps)| {
-            // Passes over a hole of the target's size are this far apart.
+            // Time between the passes on either side of a hole of the target's size.
             let sd_m = errors.pass_error_m(vehicle.target_m / speed_mps);
             [speed_mps, sd_m, (vehicle.target_m - errors.confidence_sd * sd_m).max(0.0)]
         });
@@ -70,7 +71,7 @@ impl Cable {
     }
 }
 
-/// Cable keys missing from the file. Defaults apply instead.
+/// Cable keys that the file doesn't have. Their defaults apply.
 fn missing(vehicle: &VehicleConfig, text: &str) -> Vec<String> {
     let Ok(root) = Document::new("", text).root() else { return Vec::new() };
     let navigation = root.section("navigation").ok().flatten();

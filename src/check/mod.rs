@@ -1,4 +1,4 @@
-//! `headrace check`: reports all errors in a vehicle or scene file, and the plan that follows from it.
+//! `headrace check`: reports all errors in a vehicle or scene file, and the plan that results from it.
 
 mod cable;
 mod outlook;
@@ -19,7 +19,7 @@ use crate::vehicle_file;
 use cable::Cable;
 use outlook::Outlook;
 
-/// A finding with its place.
+/// A finding, with its file and line.
 struct Found {
     grade: Grade,
     file: String,
@@ -28,10 +28,10 @@ struct Found {
     problem: String,
 }
 
-/// A readable file.
+/// A vehicle or scene file that could be read.
 struct Readable {
     vehicle: VehicleConfig,
-    /// Name and duration of the scene, s, if the file is one.
+    /// Name of the scene and its duration, s; `None` for a vehicle file.
     scene: Option<(String, f64)>,
     outlook: Option<Outlook>,
     cable: Option<Cable>,
@@ -116,9 +116,9 @@ fn all(errors: &ConfigErrors) -> Vec<Found> {
 }
 
 impl Readable {
-    /// Adds the findings of a vehicle with this file name and text.
+    /// Checks a vehicle, and adds the findings on it. `name` and `text` are those of its file.
     fn new(vehicle: VehicleConfig, (name, text): (&str, &str), found: &mut Vec<Found>) -> Self {
-        // The files that it names have been read with it.
+        // The files that the vehicle file names have been read already.
         let named = |file: &str| vehicle.attachments.iter().find(|(attached, _)| attached == file);
         let own = |file: &str| Ok(named(file).map_or(text, |(_, text)| text.as_str()).as_bytes().to_vec());
         let errors = position_error_model::expected_errors(&vehicle, "vehicle.toml", &KINDS, &own);
@@ -138,7 +138,7 @@ impl Readable {
         vehicle_file::log(name, &vehicle);
         let mut findings = vehicle.findings();
         findings.extend(too_many(&vehicle));
-        // If the vehicle has errors, findings of its plan would only follow from them.
+        // If the vehicle has errors, findings on its plan would only repeat them.
         if findings.iter().all(|finding| finding.grade != Grade::Error) {
             findings.extend(outlook.iter().flat_map(|outlook| outlook.findings(&vehicle)));
         }
@@ -176,7 +176,7 @@ impl Readable {
     }
 }
 
-/// Finding on sensors beyond the limit.
+/// Finding for a vehicle with more sensors than the limit.
 fn too_many(vehicle: &VehicleConfig) -> Option<Finding> {
     let count = vehicle.sensor_configs.len();
     let problem =
@@ -188,7 +188,7 @@ fn too_many(vehicle: &VehicleConfig) -> Option<Finding> {
     })
 }
 
-/// Adds a finding's line, and the present value to its key.
+/// Locates a finding: its line in the file, and the present value of its key.
 fn placed(finding: Finding, name: &str, text: &str) -> Found {
     let Finding { grade, key, problem } = finding;
     let line = Document::new(name, text).line_of(&key);

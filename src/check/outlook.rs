@@ -1,4 +1,4 @@
-//! Outlook: speed, hours and hidden wall that a plan derives from a vehicle file.
+//! Outlook: largest speed, hours and hidden wall, as planned from a vehicle file.
 
 use headrace_sampling::SamplingError;
 use headrace_sampling::head::HeadMode;
@@ -7,14 +7,15 @@ use headrace_sampling::plan::{Answer, HELD_SHARE, Inspection, Planner, Question,
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
 
-/// Plan for a file as it is, with the vehicle on the tunnel's axis.
+/// Plan for a file as it is. The vehicle is on the tunnel's axis.
 pub(super) struct Outlook {
-    /// Answer for the heads' own mode; `None` if their modes differ.
+    /// Answer for the mode that all heads have; `None` if their modes differ.
     own: Option<Answer>,
     /// Answer with the largest speed.
     best: Option<Answer>,
-    /// Largest speed with the heads started for the planned speed, m/s; `None` if none is planned, or their
-    /// modes differ.
+    /// Largest speed, m/s, if the heads are set in phase for the planned speed.
+    ///
+    /// `None` if no speed is planned, or if the heads' modes differ.
     as_started_mps: Option<f64>,
     planned_mps: f64,
     /// Strips that the vehicle hides from some heads.
@@ -25,14 +26,16 @@ pub(super) struct Outlook {
     length_m: f64,
 }
 
-/// Relative difference below which speeds are reported as one: the advice's margin for measuring the speed.
+/// Relative difference below which two speeds are reported as one. It is the advice's margin for measuring
+/// the speed.
 const TOLD_APART: f64 = 0.02;
-/// Relative difference below which turns are equal.
+/// Relative difference below which two turn periods are equal.
 const SAME: f64 = 1e-6;
 
 impl Outlook {
-    /// Outlook for the vehicle's heads and the errors between passes that its sensors leave; `None` without
-    /// heads.
+    /// Outlook for the vehicle's heads, with the position errors between passes that its sensors leave.
+    ///
+    /// `None` without heads.
     ///
     /// Errors: the heads can't be planned for.
     pub(super) fn of(
@@ -43,7 +46,7 @@ impl Outlook {
         let (mut heads, mut ids) = (Vec::new(), Vec::new());
         for (sensor, config) in sensors {
             let Some(spec) = sensor.head() else { continue };
-            // At the configured range all of its modes exist.
+            // With its configured range setting, a head has all of its modes.
             heads.push((spec, sensor.modes(None).unwrap_or_default()));
             ids.push(config.id.clone());
         }
@@ -149,7 +152,7 @@ impl Outlook {
         lines
     }
 
-    /// Text on the wall that the vehicle hides from some heads, or from all.
+    /// Text on the wall that the vehicle hides from some or all heads.
     fn hidden_line(&self) -> String {
         if self.hidden.is_empty() {
             return "every head sees all of the wall".to_owned();
@@ -200,15 +203,15 @@ impl Outlook {
     }
 }
 
-/// Speed for results that don't depend on it, m/s.
+/// Speed for computing results that don't depend on the speed, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
-/// A speed rounded down to 1 mm/s, so that the printed one meets the target, too.
+/// A speed rounded down to 1 mm/s. The printed speed thus meets the target, too.
 fn down(speed_mps: f64) -> f64 {
     (speed_mps * 1000.0 + 1e-6).floor() / 1000.0
 }
 
-/// Common mode of all heads, if there is one.
+/// Mode that all heads have, if there is one.
 fn own_mode(heads: &[(headrace_sampling::head::HeadSpec, Vec<HeadMode>)]) -> Option<&'static str> {
     let same = |a: f64, b: f64| (a / b - 1.0).abs() < SAME;
     let modes = heads.iter().map(|(spec, modes)| {

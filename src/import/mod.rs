@@ -202,7 +202,8 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
 
 /// Kind of a file by its extension.
 ///
-/// Autopilots' dataflash logs share Ping Viewer's extension. They are refused before any other check.
+/// Dataflash logs of autopilots have the same extension as Ping Viewer's logs. They are refused before any
+/// other check.
 fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     let kind = FileKind::of(path);
     if kind == Some(FileKind::Ping) && front_of(path)?.starts_with(&detect::DATAFLASH) {
@@ -219,7 +220,7 @@ fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     )
 }
 
-/// Error for a file that can't be imported, with its apparent kind if that differs.
+/// Error for a file that can't be imported. The text names the kind that the file seems to be, if it differs.
 fn unusable(path: &Path, error: ImportError) -> Failure {
     match error {
         ImportError::Nothing { .. }
@@ -230,7 +231,7 @@ fn unusable(path: &Path, error: ImportError) -> Failure {
     }
 }
 
-/// Error for a file of the wrong kind, with its apparent kind.
+/// Error for a file of the wrong kind. The text names the kind that the file seems to be.
 fn named(path: &Path, problem: &str) -> Failure {
     let front = match front_of(path) {
         Ok(front) => front,

@@ -9,7 +9,9 @@ use crate::failure::Failure;
 use crate::files;
 use crate::logging::complain;
 
-/// Assignment by the mapping file, or otherwise by unambiguous matches, which are listed on stderr.
+/// Assignment of topics to sensors.
+///
+/// It comes from the mapping file. Without such a file, unambiguous matches are used and listed on stderr.
 pub(super) fn feeds(
     args: &cli::Import,
     vehicle: Option<&VehicleConfig>,

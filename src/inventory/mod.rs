@@ -15,8 +15,9 @@ use crate::output::{deliver, show};
 use crate::vehicle_file;
 use state::{Inventory, Sensor, State};
 
-/// Lists the attached devices. Exit code 1 if a sensor's port is missing, may not be opened, or doesn't
-/// answer.
+/// Lists the attached devices.
+///
+/// The exit code is 1 if a sensor's port is missing, may not be opened, or doesn't answer.
 pub(crate) fn devices(args: &Devices) -> Result<u8, Failure> {
     let machine = Machine::ours();
     let vehicle = args.vehicle.as_ref().map(|path| vehicle_file::read(path)).transpose()?;
@@ -45,7 +46,7 @@ fn sensors(machine: &Machine, vehicle: &VehicleConfig, probe: bool) -> Vec<Senso
             let kind = probing::kind(&config.plugin).filter(|_| probe);
             match presence(machine, &connect)? {
                 Presence::There(name) => Ok(State::Present(name)),
-                // The device sends to this machine's port, so it can't be probed.
+                // The device sends to a port of this machine, so it can't be probed.
                 Presence::Elsewhere if matches!(connect, Connect::UdpListen { .. }) => Ok(State::NotProbed),
                 Presence::Elsewhere => match kind {
                     Some(probe) => headrace_ports::probe(&connect, &mut [probe]).map(State::Answered),

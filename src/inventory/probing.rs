@@ -7,12 +7,12 @@ use headrace_sensor::driver::{Carrier, Probe};
 use super::state::Probed;
 use crate::devices::KINDS;
 
-/// All probes, in the order in which they are sent.
+/// All probes, in the order in which they are used.
 fn all() -> Vec<Box<dyn Probe>> {
     KINDS.iter().filter_map(|kind| kind.probe()).collect()
 }
 
-/// Probe of a device kind by its name in vehicle files; `None` if it has none.
+/// Probe of a device kind by its name in vehicle files; `None` if the kind has no probe.
 pub(super) fn kind(name: &str) -> Option<Box<dyn Probe>> {
     KINDS.iter().find(|kind| kind.name() == name)?.probe()
 }

@@ -12,11 +12,11 @@ pub(super) type Probed = Result<Answer, OpenError>;
 /// All results.
 #[derive(Debug, Default)]
 pub(super) struct Inventory {
-    /// Attached devices, with the probe's result if there was one.
+    /// Attached devices, each with the probe's result if it was probed.
     pub(super) found: Vec<(Found, Option<Probed>)>,
-    /// Addresses given by `--address`.
+    /// Addresses given with `--address`.
     pub(super) addresses: Vec<(Connect, Probed)>,
-    /// Sensors of the vehicle file, if one was given.
+    /// Sensors of the vehicle file; `None` without a vehicle file.
     pub(super) sensors: Option<Vec<Sensor>>,
 }
 
@@ -28,19 +28,19 @@ pub(super) struct Sensor {
     pub(super) state: Result<State, OpenError>,
 }
 
-/// State of a sensor's port without errors.
+/// State of a sensor's port that has no error.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// It is present under this name and may be opened.
+    /// The port is present under this name and may be opened.
     Present(String),
-    /// It was probed.
+    /// The device was probed and has answered.
     Answered(Answer),
-    /// It is a network address that was not probed.
+    /// The port is a network address that was not probed.
     NotProbed,
 }
 
 impl Inventory {
-    /// Returns 1 if a sensor's port is missing, may not be opened, or was probed and didn't answer.
+    /// Returns 1 if a sensor's port is missing, may not be opened, or didn't answer a probe.
     pub(super) fn exit_code(&self) -> u8 {
         let mut sensors = self.sensors.iter().flatten();
         if sensors.any(|sensor| !sensor.is_ready()) { failure::FAILED } else { failure::OK }

@@ -1,4 +1,4 @@
-//! Claims of one command: its outputs differ from its inputs and from one another.
+//! Claims of one command. They keep outputs different from inputs and from one another.
 
 use std::path::{Path, PathBuf};
 
@@ -9,41 +9,42 @@ use super::{Kind, may_write};
 use crate::cli::Overwrite;
 use crate::failure::Failure;
 
-/// Files that a command reads, and files that it is going to write.
+/// Files that a command reads, and files that it will write.
 pub(crate) struct Claims {
     force: bool,
     inputs: Vec<PathBuf>,
     outputs: Vec<Claimed>,
 }
 
-/// An output.
+/// An output file.
 struct Claimed {
-    /// Option or argument that names it.
+    /// Option or argument that names the output.
     option: &'static str,
     path: PathBuf,
-    /// Whether its parts are also written.
+    /// Whether the output is a recording, which may also write parts.
     is_recording: bool,
 }
 
 impl Claims {
-    /// Claims of a command that reads these files.
+    /// Creates the claims of a command that reads these files.
     pub(crate) fn reading(inputs: impl IntoIterator<Item = PathBuf>, overwrite: &Overwrite) -> Self {
         Self { force: overwrite.force, inputs: inputs.into_iter().collect(), outputs: Vec::new() }
     }
 
-    /// Checks, before the work, that a file may and can be written, without changing anything.
+    /// Checks before the work that a file may be overwritten and can be written. The file isn't changed.
     ///
-    /// Errors: the command reads it, or already writes it; the existing file isn't of this kind and there is
-    /// no `--force`; or it can't be written or created.
+    /// Errors: the command reads the file or already writes it, the existing file is of another kind and
+    /// there is no `--force`, or the file can't be written or created.
     pub(crate) fn claim(&mut self, option: &'static str, path: &Path, kind: Kind) -> Result<(), Failure> {
         self.add(Claimed { option, path: path.to_owned(), is_recording: false })?;
         may_write(path, kind, self.force)
     }
 
-    /// Claims a recording, which creates its first file itself, in parts if `rotated`. Returns the path of
-    /// that file.
+    /// Claims a recording, in parts if `rotated`. The recorder itself creates the first file, whose path is
+    /// returned.
     ///
-    /// Errors: see [`claim`](Self::claim); also an existing file that would be taken for another part of it.
+    /// Errors: see [`claim`](Self::claim). Another error is an existing file that would pass for another part
+    /// of the recording.
     pub(crate) fn claim_recording(
         &mut self,
         option: &'static str,
@@ -97,13 +98,15 @@ impl Claims {
 }
 
 impl Claimed {
-    /// Whether it has the name of a part of a recording.
+    /// Whether the output has the name of a part of `recording`.
     fn is_part_of(&self, recording: &Self) -> bool {
         recording.is_recording && named_part(&self.path).is_some_and(|(of, _)| is_same(&of, &recording.path))
     }
 }
 
-/// Whether two paths lead to one file, or will. Special files such as `/dev/null` have no content to lose.
+/// Whether two paths lead to the same file, or will do so once it exists.
+///
+/// Special files such as `/dev/null` have no content to lose, so they don't count.
 fn is_same(one: &Path, other: &Path) -> bool {
     let is_special = |path: &Path| path.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir());
     if is_special(one) || is_special(other) {
@@ -113,7 +116,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     place(one) == place(other) || number(one).is_some_and(|one| number(other) == Some(one))
 }
 
-/// Target of a path, even if no file exists there yet.
+/// File to which a path leads, even if it doesn't exist yet.
 fn place(path: &Path) -> PathBuf {
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());

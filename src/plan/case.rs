@@ -23,12 +23,12 @@ use crate::failure::Failure;
 use crate::files;
 use crate::vehicle_file;
 
-/// Kind of the heads without a vehicle file.
+/// Kind of the heads if there is no vehicle file.
 const USUAL_HEAD: &str = "imagenex881";
-/// Range setting of these heads, m, as in the maker's table of modes.
+/// Range setting of these heads, m. Source: the maker's table of modes.
 const USUAL_RANGE_M: f64 = 10.0;
 
-/// An inspection with its names.
+/// An inspection to be planned, with the names of its parts.
 pub(super) struct Case {
     pub(super) inspection: Inspection,
     pub(super) heads: Vec<String>,
@@ -37,14 +37,14 @@ pub(super) struct Case {
     pub(super) question: Question,
     /// Expected position errors; `None` without a vehicle file.
     pub(super) errors: Option<ExpectedErrors>,
-    /// Files that it was read from.
+    /// Files that the inspection was read from.
     pub(super) inputs: Vec<PathBuf>,
 }
 
 type Head = (HeadSpec, Vec<HeadMode>);
 
 impl Case {
-    /// Creates it from the options, which override the vehicle file.
+    /// Creates the case from the options, which override the vehicle file.
     pub(super) fn of(args: &Plan) -> Result<Self, Failure> {
         let question = Question {
             target_m: args.target,
@@ -136,12 +136,12 @@ impl Case {
     }
 }
 
-/// Whether a tunnel's name is that of a polyline file.
+/// Whether the name of a tunnel is that of a polyline file.
 fn is_file(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension == "csv")
 }
 
-/// File of the tunnel, if it is read from one.
+/// Files that describe the tunnel; empty if it isn't read from a file.
 fn tunnel_file(args: &Plan) -> Vec<PathBuf> {
     let name = args.tunnel.as_deref().and_then(|tunnel| tunnel.split(',').next()).map(str::trim);
     name.filter(|name| is_file(name)).map(PathBuf::from).into_iter().collect()
@@ -169,7 +169,7 @@ fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
     Ok(TunnelConfig::from_section(&root, load)?)
 }
 
-/// The heads of a vehicle, at `range_m` if given.
+/// Heads of a vehicle, with the range setting `range_m`, if given.
 fn heads_of(path: &Path, sensors: &[Box<dyn Device>], range_m: Option<f64>) -> Result<Vec<Head>, Failure> {
     let mut heads = Vec::new();
     for sensor in sensors {
@@ -184,7 +184,7 @@ fn heads_of(path: &Path, sensors: &[Box<dyn Device>], range_m: Option<f64>) -> R
     Ok(heads)
 }
 
-/// Heads that are all at the vehicle's origin, as the closed forms assume.
+/// Heads that are all at the vehicle's origin, as the closed formulas assume.
 fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
     let kind = KINDS.iter().find(|kind| kind.name() == USUAL_HEAD);
     let kind = kind.ok_or_else(|| Failure::Usage(format!("plan: this build has no {USUAL_HEAD}")))?;
@@ -198,7 +198,7 @@ fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
             mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
             latency: DurNs::ZERO,
         };
-        // All modes are planned, so any will do here.
+        // The plan covers all modes, so any mode will do here.
         let own = Document::new("plan", "mode = \"slow\"").root()?;
         let device = kind.configure(&config, &own)?;
         let mut heads = heads_of(Path::new("plan"), &[device], Some(range_m))?;

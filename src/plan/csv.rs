@@ -1,4 +1,4 @@
-//! The modes of a plan as CSV: a row per mode, units in the headings.
+//! The modes of a plan as CSV: one row per mode, with units in the headings.
 
 use headrace_sampling::plan::{Answer, Spacing};
 
@@ -7,7 +7,7 @@ t_y_max_rest_m,t_yp_m,t_y2_m,v_max_mps,needed_h,reason,speed_mps,advance_m,pitch
 t_y_mean_m,t_y_max_m,t_min_m,t_mean_m,t_max_m,hit_once_m,hit_twice_m,meets_target,suffices,best,geometry_mps,\
 hidden_mps,phase_mps,swing_mps,position_mps,losses_mps,pass_error_m";
 
-/// The table, without a final line end.
+/// The table as CSV, without a line end after the last row.
 pub(super) fn csv(answers: &[Answer]) -> String {
     let rows = answers.iter().map(|answer| row(answer).join(","));
     std::iter::once(HEADINGS.to_owned()).chain(rows).collect::<Vec<_>>().join("\n")
@@ -57,7 +57,7 @@ fn known(value: Option<f64>) -> String {
     value.map(number).unwrap_or_default()
 }
 
-/// At most six decimals.
+/// A number with at most six decimals.
 fn number(value: f64) -> String {
     let text = format!("{value:.6}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

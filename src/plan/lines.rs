@@ -1,4 +1,4 @@
-//! `headrace plan --write`: prints lines for the vehicle file.
+//! `headrace plan --write`: prints the lines for a vehicle file.
 
 use crate::cli::Plan;
 use crate::failure::Failure;
@@ -7,8 +7,9 @@ use headrace_sampling::plan::HELD_SHARE;
 
 use super::findings::Findings;
 
-/// Keys of a vehicle file for the plan's best answer: layout, planned speed and modes. Start angles follow
-/// from them.
+/// Keys of a vehicle file for the best answer of the plan: layout, planned speed and modes.
+///
+/// The start angles follow from these keys.
 ///
 /// Errors: there is no vehicle file, or no mode meets the target.
 pub(super) fn lines(findings: &Findings, args: &Plan) -> Result<String, Failure> {

@@ -68,7 +68,7 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
         let speed_mps = best.speed_mps?;
         Some((number, if asked { speed_mps } else { printed_mps(speed_mps) }))
     });
-    // Occlusion is reported even if no mode meets the target.
+    // Occlusion is reported even if no mode meets the target, so any speed will do.
     let (mode, speed_mps) = shown.unwrap_or((0, ANY_SPEED_MPS));
     let briefing = planner.briefing(mode, speed_mps)?;
     let footprints_m = planner.footprints_m()?;
@@ -87,7 +87,7 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
     })
 }
 
-/// Gain of heads in line, if a speed was requested and the gain is more than a twentieth.
+/// Gain in speed with heads in line, if the plan is to find a speed and the gain exceeds a twentieth.
 fn in_line(planner: &Planner, question: &Question) -> Result<Option<InLine>, SamplingError> {
     let asks_for_speed = question.speed_mps.is_none() && question.time_s.is_none();
     let Some(target_m) = question.target_m.filter(|_| asks_for_speed) else { return Ok(None) };
@@ -101,7 +101,7 @@ fn is_met(answer: &Answer) -> bool {
         && answer.spacing.is_some_and(|spacing| spacing.t_max_m.is_some())
 }
 
-/// Speed for results that don't depend on it, m/s.
+/// Speed for computing results that don't depend on the speed, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;

@@ -1,4 +1,4 @@
-//! A plan as text.
+//! Prints a plan as text.
 
 use headrace_sampling::head::Basis;
 use headrace_sampling::layout::HeadLayout;
@@ -97,7 +97,7 @@ const HEADINGS: [&str; 2] = [
 fn row(answer: &Answer) -> String {
     let mark = if answer.best { '*' } else { ' ' };
     let estimated = if answer.turn_basis == Basis::Estimated.as_str() { '~' } else { ' ' };
-    // There is no spacing if no head sees the wall.
+    // If no head sees the wall, there is no spacing.
     let worst = if answer.t_y2_m > 0.0 { format!("{:.3}", answer.t_y2_m) } else { "-".to_owned() };
     let known = format!(
         "{mark} {:<8} {:>4.1} {estimated}{:>6.2} {:>8.2}  {:>5.3}  {:>5.3}  {worst:>5}",
@@ -139,7 +139,7 @@ fn spacing_columns(spacing: &Spacing, speed_mps: f64) -> String {
 
 fn notes(findings: &Findings) -> Vec<String> {
     let mut notes = Vec::new();
-    // One reason often holds for several modes.
+    // Several modes often have the same reason.
     let mut reasons: Vec<(&String, Vec<&str>)> = Vec::new();
     for answer in &findings.answers {
         let Some(why) = &answer.refused else { continue };
@@ -181,9 +181,9 @@ fn best_words(best: &Answer) -> String {
     }
 }
 
-/// Text on the price of each margin that costs speed.
+/// Text on the speed that each margin costs.
 fn margin_words(mode: &str, margins: &Margins) -> String {
-    /// Difference below what the printed speeds show, m/s.
+    /// Price of a margin that the printed speeds would not show, m/s.
     const NOTHING_MPS: f64 = 5e-4;
     let mut words = vec![format!("{mode}: {:.3} m/s from the geometry alone", margins.geometry_mps)];
     let after = margins.speeds_mps().into_iter().skip(1);
@@ -195,7 +195,7 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
             Margin::Position => {
                 format!("with passes known to +-{:.1} cm", 100.0 * margins.pass_error_m)
             }
-            // A plan has no losses.
+            // A plan assumes no lost returns.
             Margin::Geometry | Margin::Losses => continue,
         };
         if price_mps >= NOTHING_MPS {
@@ -205,7 +205,7 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
     words.join(", ")
 }
 
-/// Text on the gain of heads in line.
+/// Text on the gain in speed with heads in line.
 fn in_line_words(findings: &Findings, in_line: &InLine) -> String {
     let InLine { positions_m, mode, v_max_mps, .. } = in_line;
     let hours = findings.planner.inspection().length_m / v_max_mps / 3600.0;
@@ -218,7 +218,7 @@ fn in_line_words(findings: &Findings, in_line: &InLine) -> String {
     )
 }
 
-/// Occlusion by the vehicle, and strips of the wall with fewer passes.
+/// Text on occlusion by the vehicle, and on strips of wall with fewer passes.
 fn hidden_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let names = |heads: &[usize]| names(findings, heads);
     let hidden = briefing.hidden.iter().map(|hidden| {
@@ -239,7 +239,8 @@ fn names(findings: &Findings, heads: &[usize]) -> String {
     heads.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
-/// Start angles, interference between heads, and distances along the hull with equal start angles.
+/// Text on start angles, on interference between heads, and on distances along the hull that allow equal
+/// start angles.
 fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let names = |heads: &[usize]| names(findings, heads);
     let mut lines = Vec::new();
@@ -260,7 +261,7 @@ fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
             starts.join("; ")
         ));
     }
-    // Equal distances give the same rule.
+    // Pairs of heads with equal distances have the same rule, which is printed once.
     let mut said = Vec::new();
     for rule in &briefing.hull_rules {
         let text = format!(

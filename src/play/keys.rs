@@ -13,13 +13,13 @@ use rustix::termios::{LocalModes, OptionalActions, SpecialCodeIndex, Termios, tc
 use crate::cli::KEYS;
 use crate::output::aside;
 
-/// Length of a jump by an arrow key.
+/// Length of a jump by an arrow key: to the left or right, and up or down.
 const STEP: DurNs = DurNs::from_millis(10_000);
 const FAR: DurNs = DurNs::from_millis(60_000);
-/// Range of speeds. Beyond the fastest, playback is as fast as possible.
+/// Slowest and fastest speed of playback, relative to real time. Beyond the fastest, playback is unlimited.
 const SLOWEST: f64 = 0.125;
 const FASTEST: f64 = 1024.0;
-/// Longest wait for a key before the end of playback is noticed.
+/// Longest wait for a key. After it, the end of playback is noticed.
 const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 
 /// A key of playback.
@@ -37,15 +37,15 @@ pub(crate) enum Key {
     Help,
 }
 
-/// Standard input without line buffering and echo, until it is dropped.
+/// Standard input without line buffering and echo. The settings are restored when the value is dropped.
 pub(super) struct Keyboard {
     before: Termios,
     ended: Arc<AtomicBool>,
 }
 
 impl Keyboard {
-    /// Reads the terminal's keys and sends their commands to `to` from a thread of its own. `speed` is that
-    /// of playback.
+    /// Reads the terminal's keys on a separate thread, and sends their commands to `to`. `speed` is that of
+    /// playback.
     ///
     /// Errors: the terminal's settings can't be read or changed.
     pub(super) fn listen(
@@ -55,7 +55,7 @@ impl Keyboard {
     ) -> io::Result<Self> {
         let before = tcgetattr(io::stdin())?;
         let mut raw = before.clone();
-        // Ctrl-C is also read as a key, so that the terminal is restored before the program ends.
+        // Ctrl-C is read as a key, too, so that the terminal is restored before the program ends.
         raw.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG);
         raw.special_codes[SpecialCodeIndex::VMIN] = 1;
         raw.special_codes[SpecialCodeIndex::VTIME] = 0;
@@ -92,7 +92,7 @@ impl Drop for Keyboard {
     }
 }
 
-/// Reads typed bytes; returns none after some time without any.
+/// Reads typed bytes. Returns none after a time without any.
 ///
 /// Errors: standard input is closed.
 fn read(bytes: &mut [u8]) -> io::Result<usize> {
@@ -108,11 +108,11 @@ fn read(bytes: &mut [u8]) -> io::Result<usize> {
     }
 }
 
-/// Speed and state as set by the keys.
+/// Speed and pause as set by the keys.
 pub(crate) struct Hand {
     speed: Option<f64>,
     paused: bool,
-    /// Shows an answer to a key.
+    /// Shows the answer to a key.
     say: fn(&str),
 }
 
@@ -121,7 +121,7 @@ impl Hand {
         Self { speed, paused: false, say }
     }
 
-    /// Speed of playback; `None` is as fast as possible.
+    /// Speed of playback; `None` if unlimited.
     pub(crate) fn speed(&self) -> Option<f64> {
         self.speed
     }
@@ -131,7 +131,7 @@ impl Hand {
         self.paused
     }
 
-    /// Command of a key, if it has one.
+    /// Command for a key, if the key has one.
     pub(crate) fn command(&mut self, key: Key) -> Option<PlaybackCommand> {
         Some(match key {
             Key::Space => {
@@ -163,7 +163,7 @@ impl Hand {
     }
 }
 
-/// Keys of some bytes; unknown ones are ignored. A terminal sends all bytes of a key at once.
+/// Keys that some bytes represent. Unknown ones are ignored. A terminal sends all bytes of a key at once.
 fn keys(mut bytes: &[u8]) -> Vec<Key> {
     let arrows = [(b'A', Key::Up), (b'B', Key::Down), (b'C', Key::Right), (b'D', Key::Left)];
     let mut keys = Vec::new();
@@ -192,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_are_keys() {
+    fn bytes_of_a_terminal_are_decoded_to_playback_keys() {
         assert_eq!(
             keys(b" \x1b[D\x1bOC\x1b[A\x1b[B+-.?"),
             [
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_commands() {
+    fn keys_give_their_playback_commands() {
         let mut hand = Hand::new(None, |_| {});
         let mut press = |key| hand.command(key).unwrap();
         assert_eq!(press(Key::Space), PlaybackCommand::Pause);

@@ -1,6 +1,6 @@
-//! Anonymised header of a log: without comments, names, addresses, serial numbers and time of day.
+//! Anonymises the header of a log: removes comments, names, addresses, serial numbers and the time of day.
 //!
-//! The vehicle file is edited as text, string by string; keys and numbers are kept.
+//! The vehicle file is edited as text, string by string. Its keys and numbers are kept.
 
 use headrace_replay::log::format::{FORMAT_KEY, VEHICLE_FILE};
 use headrace_replay::log::{DiveLog, LogHeader, SourceInfo, TRIMMED};
@@ -11,9 +11,10 @@ use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 
-/// Metadata keys that are kept, as they don't identify anyone.
+/// Metadata keys that are kept, because their values don't identify anyone.
 const KEPT_KEYS: [&str; 4] = [FORMAT_KEY, "version", "import_format", TRIMMED];
-/// Log times later than this (the beginning of the year 2000) are UTC, and not those of a monotonic clock.
+/// Log times after this one, the beginning of the year 2000, are UTC. Earlier ones are those of a monotonic
+/// clock.
 const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
 
 /// Header without identifying data.
@@ -47,7 +48,7 @@ impl Anonymous {
         Ok(Self { vehicle_toml, names, left: left(log, vehicle) })
     }
 
-    /// Header of the new log.
+    /// Header of the new log: `header` without identifying data.
     pub(crate) fn header(&self, mut header: LogHeader) -> LogHeader {
         header.vehicle_toml.clone_from(&self.vehicle_toml);
         for (name, _) in &mut header.attachments {
@@ -63,7 +64,7 @@ impl Anonymous {
     }
 }
 
-/// Text on items that can't be removed.
+/// Texts on items that can't be removed.
 fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
     let info = log.header();
     let ids = |sources: &[SourceInfo]| {
@@ -85,14 +86,14 @@ fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
     left
 }
 
-/// A file name's extension, with the dot.
+/// Extension of a file name, with the dot.
 fn ending(name: &str) -> &str {
     name.rfind('.').and_then(|dot| name.get(dot..)).unwrap_or_default()
 }
 
-/// A `connect` of the same carrier without identifying parts; `number` keeps several distinct.
+/// A `connect` with the same carrier, but without identifying parts. `number` makes the results distinct.
 fn connect(text: &str, number: usize) -> String {
-    // Documentation addresses, RFC 5737.
+    // Addresses reserved for documentation. Source: RFC 5737.
     let host = |address: &str| {
         let port = address.rsplit_once(':').map_or("", |(_, port)| port);
         format!("192.0.2.{}:{port}", number % 250 + 1)
@@ -115,7 +116,7 @@ fn connect(text: &str, number: usize) -> String {
     connect.to_string()
 }
 
-/// The vehicle file without comments, and with names, addresses and attached files replaced.
+/// The vehicle file without comments. Names, addresses and attached files are replaced.
 fn anonymised(text: &str, names: &[(String, String)]) -> String {
     let (mut clean, mut rest, mut count) = (String::new(), text, 0);
     while let Some(c) = rest.chars().next() {
@@ -138,7 +139,7 @@ fn anonymised(text: &str, names: &[(String, String)]) -> String {
     lines.fold(String::new(), |all, line| all + line + "\n")
 }
 
-/// Length of the TOML string that `text` begins with, in bytes, including its quotes.
+/// Length of the TOML string at the beginning of `text`, in bytes, including its quotes.
 fn string_len(text: &str, quote: char) -> usize {
     let long: String = [quote; 3].iter().collect();
     let end = if text.starts_with(&long) { long.as_str() } else { text.get(..1).unwrap_or_default() };
@@ -155,7 +156,7 @@ fn string_len(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// Key whose value begins at the end of `text`, without the tables before it.
+/// Key whose value follows `text`. The names of the tables before it are left out.
 fn key_before(text: &str) -> &str {
     let line = text.rsplit(['\n', ',', '{', '[']).next().unwrap_or_default();
     let key = line.split_once('=').map_or("", |(key, _)| key);
@@ -186,7 +187,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn anonymising_removes_comments_names_addresses_and_files_only() {
+    fn anonymising_changes_only_comments_names_addresses_and_files() {
         let text = r##"# Gate 3 of the Upper Plant
 name = "VITA # 7" # Anna's
 target_m = 1.2
@@ -234,7 +235,7 @@ inner."name" = "name 6"
     }
 
     #[test]
-    fn anonymised_shipped_vehicles_differ_only_in_names() {
+    fn anonymised_shipped_vehicle_files_differ_only_in_names() {
         for name in ["vita1.toml", "vita2-2.toml", "vita2-3.toml", "vita2-4.toml"] {
             let file = format!("{}/deploy/vehicles/{name}", env!("CARGO_MANIFEST_DIR"));
             let text = std::fs::read_to_string(file).unwrap();
@@ -256,7 +257,7 @@ inner."name" = "name 6"
     }
 
     #[test]
-    fn unterminated_strings_are_processed() {
+    fn anonymising_accepts_unterminated_strings() {
         for text in ["name = \"", "'", "\"\"\"", "\"\\", "#", "name = 'é", "\u{e9}#"] {
             anonymised(text, &[]);
         }

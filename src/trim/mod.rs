@@ -31,7 +31,8 @@ use anonymous::Anonymous;
 
 /// Tick length of the replay that finds the vehicle's chainage over time.
 const TICK: DurNs = DurNs::from_millis(20);
-/// Longest gap outside the range of chainage, or without a fix, that is not cut out.
+/// Longest gap that is kept in the log. During a gap the vehicle is outside the range of chainage, or has no
+/// fix.
 const BRIDGED: DurNs = DurNs::from_millis(2000);
 
 /// `headrace trim`.
@@ -60,7 +61,7 @@ fn needs_vehicle(args: &Trim) -> bool {
     args.chainage.is_some() || args.drop_echoes || args.anonymise
 }
 
-/// The vehicle, if the options need it.
+/// The vehicle; `None` if the options don't need it.
 fn vehicle(
     args: &Trim,
     given: Given,
@@ -75,7 +76,7 @@ fn vehicle(
     Ok(Some(vehicle))
 }
 
-/// Spans of log time to keep; empty to keep all.
+/// Spans of log time to keep; empty if all is kept.
 fn spans(
     args: &Trim,
     files: &[PathBuf],
@@ -104,7 +105,7 @@ fn spans(
     Ok(vec![(from, to)])
 }
 
-/// Spans of log time in which the vehicle was in a range of chainage, m, found by a replay.
+/// Spans of log time in which the vehicle was within a range of chainage, m. They are found by a replay.
 fn when_within(
     files: &[PathBuf],
     vehicle: &VehicleConfig,
@@ -131,7 +132,7 @@ fn when_within(
     Ok(spans)
 }
 
-/// Text on the changes.
+/// Text on the changes to the log.
 fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> Result<Vec<String>, Failure> {
     let mut said = Vec::new();
     if args.anonymise {
@@ -200,7 +201,7 @@ fn write(
         header: &header,
         change: &mut change,
         voices: !args.anonymise,
-        // Alerts and notes name people.
+        // The results on this topic contain names of people, from alerts and notes.
         results: &|topic| !args.anonymise || !topic.ends_with("/alerts"),
     };
     let mut file = AtomicFile::create(&args.output).map_err(failed)?;
@@ -215,7 +216,7 @@ fn write(
     Ok(trimmed)
 }
 
-/// Error if no sensor's message is within the requested times or chainage.
+/// Error if no message of a sensor is within the requested times or chainages.
 fn nothing_kept(args: &Trim, files: &[PathBuf]) -> Result<Failure, Failure> {
     let mut log = DiveLog::open(files)?;
     let last = log.times().map_or(MonoNs(0), |times| times.1);

@@ -1,11 +1,11 @@
-//! Alerts as listed on the screen, and the operator's commands.
+//! The screen's alerts, and the operator's commands.
 
 use headrace_monitor::alert_list::{AlertState, ListedAlert, Priority};
 use headrace_monitor::console::{Command, ConsolePort, NoteText, Who};
 use headrace_monitor::live_state::Lamp;
 use headrace_monitor::run::Loop;
 
-/// Author of commands from this screen.
+/// Author of the commands from this screen.
 const BY: &str = "terminal";
 
 /// An alert on the screen.
@@ -13,16 +13,16 @@ const BY: &str = "terminal";
 pub(super) struct AlertRow {
     pub(super) number: u32,
     pub(super) priority: &'static str,
-    /// Whether its condition holds, and whether it is acknowledged.
+    /// Whether the condition holds, and whether the alert is acknowledged, as text.
     pub(super) state: &'static str,
     pub(super) lamp: Lamp,
-    /// Flashes until it is acknowledged.
+    /// Whether the alert flashes because somebody must still acknowledge it.
     pub(super) needs_acknowledgement: bool,
     pub(super) text: String,
     pub(super) advice: String,
 }
 
-/// Live alerts, most urgent first, and the number of further ones.
+/// Live alerts, most urgent first, and the number of those left out.
 pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
     let around = dive.surroundings();
     let (shown, hidden) = dive.alert_list().shown();
@@ -55,23 +55,23 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
 pub(super) struct Desk(Option<ConsolePort>);
 
 impl Desk {
-    /// Creates the desk; without a console for a recorded dive.
+    /// Creates the desk. A recorded dive has no console.
     pub(super) fn new(console: Option<ConsolePort>) -> Self {
         Self(console)
     }
 
-    /// Acknowledges the alert with this number, or all with 0; returns the answer to show.
+    /// Acknowledges the alert with this number, or all alerts with 0. Returns the answer to show.
     pub(super) fn acknowledge(&self, alert: u32) -> String {
         let done = if alert == 0 { "all acknowledged".to_owned() } else { format!("{alert} acknowledged") };
         self.send(&Command::Acknowledge { alert, by: Who::cut(BY) }, done)
     }
 
-    /// Silences all sounding alerts; returns the answer to show.
+    /// Silences all sounding alerts. Returns the answer to show.
     pub(super) fn silence(&self) -> String {
         self.send(&Command::Silence { by: Who::cut(BY) }, "alerts silenced for 30 s".to_owned())
     }
 
-    /// Adds a note at the present place; returns the answer to show.
+    /// Adds a note at the present place. Returns the answer to show.
     pub(super) fn note(&self, text: &str) -> String {
         self.send(&Command::Note { text: NoteText::cut(text), by: Who::cut(BY) }, format!("noted: {text}"))
     }

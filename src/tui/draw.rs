@@ -1,4 +1,4 @@
-//! Layout of the screen: rows in order of importance, each panel as high as there is room for.
+//! Layout of the screen. Panels come in order of importance, each as high as the room allows.
 
 use std::collections::VecDeque;
 
@@ -22,13 +22,13 @@ use crate::cli::KEYS;
 const MOST_TOLD: usize = 100;
 /// Minimum size of the screen.
 const LEAST: (u16, u16) = (40, 10);
-/// Size from which the allowed speed is also written in large digits.
+/// Minimum size of the screen at which the allowed speed is also shown in large digits.
 const LARGE: (u16, u16) = (90, 34);
 
 /// State of a replay's playback.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Playing {
-    /// `None` is as fast as possible.
+    /// Speed; `None` if unlimited.
     pub(super) speed: Option<f64>,
     pub(super) paused: bool,
 }
@@ -40,10 +40,10 @@ pub(super) struct Page {
     pub(super) shot: Option<ScreenFrame>,
     pub(super) wall: Wall,
     told: VecDeque<PilotLine>,
-    /// Time for which the loop has been stalled.
+    /// Time for which the loop has been stalled; `None` if it isn't.
     pub(super) late: Option<DurNs>,
     pub(super) playing: Option<Playing>,
-    /// A note being written.
+    /// A note that is being written.
     pub(super) note: Option<String>,
     pub(super) help: bool,
     pub(super) extent: Extent,
@@ -67,7 +67,7 @@ impl Page {
         }
     }
 
-    /// Takes a frame.
+    /// Updates the page with a frame.
     pub(super) fn take(&mut self, mut shot: ScreenFrame) {
         self.wall.take(&shot.wall);
         for line in shot.told.drain(..) {
@@ -97,7 +97,7 @@ impl Page {
         self.said = None;
     }
 
-    /// Draws everything.
+    /// Draws the whole page.
     pub(super) fn draw(&self, to: &mut Buffer) {
         let area = to.area;
         if area.width < LEAST.0 || area.height < LEAST.1 {
@@ -126,8 +126,8 @@ impl Page {
 
     /// Draws the panels within the available room.
     fn panels(&self, shot: &ScreenFrame, rows: &mut Rows<'_>) {
-        // Alerts and messages have at least two rows, the wall its two strips. Each panel except the last has
-        // a title.
+        // Alerts and messages have at least two rows, and the wall has two strips. Each panel except the last
+        // has a title.
         let left = usize::from(rows.left()).saturating_sub(3 + 3 + 1 + 2);
         let well = shot.sensors.iter().filter(|sensor| sensor.state == SensorState::Ok).count();
         let wanted = shot.sensors.len() - well + panels::sensor_rows(well, usize::from(rows.width()));
@@ -250,7 +250,7 @@ impl Page {
                 break;
             }
             let broken = line.broken(columns);
-            // If a line doesn't fit whole, its beginning is shown.
+            // If a message doesn't fit in full, only its beginning is shown.
             let fits = broken.len().min(room - lines.len());
             broken.into_iter().take(fits).rev().for_each(|text| lines.push_front((text, line.lamp)));
         }
@@ -271,7 +271,7 @@ impl Page {
                     if self.playing.is_some() { &["space pause", "arrows seek", "q quit"] } else { &[] };
                 let ours = ["a acknowledge", "s silence", "n note", "w wall", "Ctrl-C ends the dive"];
                 let mut text = " ? keys".to_owned();
-                // As many keys as fit.
+                // As many keys are shown as there is room for.
                 for key in play.iter().chain(&ours) {
                     if text.len() + 2 + key.len() < usize::from(rows.to.area.width) {
                         text = format!("{text}  {key}");
@@ -323,7 +323,7 @@ impl Page {
     }
 }
 
-/// Replaces non-ASCII characters of external text. A plain plus would not mean plus or minus.
+/// Replaces the non-ASCII characters of external text. A single plus must not stand for plus or minus.
 fn in_ascii(cell: &mut Cell) {
     if !cell.symbol().is_ascii() {
         let plain = if cell.symbol() == "±" { "~" } else { "?" };

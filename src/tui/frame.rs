@@ -1,4 +1,4 @@
-//! A frame: a snapshot of the dive by value, made on the loop's thread between ticks.
+//! A frame of the screen: a copy of the dive's state, made on the loop's thread between ticks.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -24,7 +24,7 @@ use super::wall::{Cell, Clock, WallNews};
 const RATE_OVER: DurNs = DurNs(2_000_000_000);
 /// Maximum number of messages kept between two frames.
 const MOST_TOLD: usize = 64;
-/// Number of sections on either side of the vehicle that every frame updates.
+/// Number of sections on either side of the vehicle that every frame includes.
 const NEAR: i64 = 8;
 
 /// A frame.
@@ -40,9 +40,9 @@ pub(super) struct ScreenFrame {
     pub(super) reason: String,
     pub(super) sensors: Vec<SensorRow>,
     pub(super) alerts: Vec<AlertRow>,
-    /// Number of further alerts.
+    /// Number of alerts left out.
     pub(super) alerts_hidden: usize,
-    /// Text, and whether it is an alarm.
+    /// Text on the recordings, and whether it is an alarm.
     pub(super) recording: Option<(String, bool)>,
     pub(super) wall: WallNews,
     /// Messages since the last frame, oldest first.
@@ -55,7 +55,7 @@ pub(super) struct SensorRow {
     pub(super) state: SensorState,
     pub(super) age: Option<DurNs>,
     pub(super) rate_hz: Option<f64>,
-    /// Status of its port, unless it runs.
+    /// Status of the sensor's port; empty while the port is running.
     pub(super) why: String,
 }
 
@@ -64,10 +64,10 @@ pub(super) struct FrameBuilder {
     vehicle: String,
     teller: LiveMessages,
     told: VecDeque<PilotLine>,
-    /// Sections that have changed since the last frame; `None` for all.
+    /// Sections that have changed since the last frame; `None` if all have to be shown.
     changed: Option<BTreeSet<i64>>,
     clock: Option<Clock>,
-    /// Reading counts of each sensor at two times.
+    /// Number of readings of each sensor, at two times.
     counted: [Option<(MonoNs, Vec<u64>)>; 2],
     recorded: RecordingState,
     ports: BTreeMap<usize, String>,
@@ -126,7 +126,7 @@ impl FrameBuilder {
         self.recorded = *state;
     }
 
-    /// Makes the next frame contain all sections, after a lost frame.
+    /// Makes the next frame include all sections, because a frame was lost.
     pub(super) fn show_all_again(&mut self) {
         self.changed = None;
     }
@@ -215,7 +215,7 @@ impl FrameBuilder {
     }
 }
 
-/// Text on the limiting factor of the speed, unless the condition already states it.
+/// Text on the reason that limits the speed, unless the condition states it already.
 fn reason_text(
     advice: &Advice,
     state: &LiveState,
@@ -228,7 +228,7 @@ fn reason_text(
     advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile, heads)
 }
 
-/// Adds the line of a message if it adds something to the list of alerts.
+/// Adds a message's line to `to`, if the line adds something to the list of alerts.
 fn tell(one: &LiveMessage, dive: &Loop, to: &mut Vec<PilotLine>) {
     if one.adds_line() {
         to.push(message_line(one, &dive.mission().profile, dive.head_descriptions()));

@@ -36,7 +36,7 @@ impl Key {
     }
 }
 
-/// Keys of some bytes. A terminal sends all bytes of a key at once.
+/// Keys that some bytes represent. A terminal sends all bytes of a key at once.
 pub(super) fn keys(bytes: &[u8]) -> Vec<Key> {
     let text = String::from_utf8_lossy(bytes);
     let mut rest = text.as_ref();
@@ -49,7 +49,7 @@ pub(super) fn keys(bytes: &[u8]) -> Vec<Key> {
                     keys.push(Key::Escape);
                     continue;
                 };
-                // Parameters, then a letter or a tilde.
+                // An escape sequence has parameters, then a letter or a tilde.
                 let end = code.find(|c: char| c.is_ascii_alphabetic() || c == '~');
                 let Some(end) = end else { return keys };
                 let arrow = code.as_bytes().get(end).copied();
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_are_keys() {
+    fn bytes_of_a_terminal_are_decoded_to_screen_keys() {
         assert_eq!(
             keys("a\x1b[D\x1bOA\u{e4}\r\x7f\x1b[3~ \x03".as_bytes()),
             [

@@ -1,4 +1,4 @@
-//! Reads the terminal's keys and counts signals on a thread of its own.
+//! Reads the terminal's keys and counts signals, on a separate thread.
 
 use std::io;
 use std::sync::Arc;
@@ -13,12 +13,12 @@ use super::message::Message;
 use super::terminal_guard;
 use crate::interrupt::{self, Requests};
 
-/// Longest wait for a key before the end is noticed.
+/// Longest wait for a key. After it, the end of the dive is noticed.
 const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
 
 /// Sends keys until the returned flag is set.
 ///
-/// Ctrl-C sets `interrupted` as SIGINT does. A second one, over a second later, restores the terminal and
+/// Like SIGINT, Ctrl-C sets `interrupted`. A second Ctrl-C, over a second later, restores the terminal and
 /// ends the program at once.
 ///
 /// Errors: signals can't be counted, or the thread can't be started.
@@ -46,7 +46,7 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
                 continue;
             }
             match rustix::io::read(&stdin, &mut bytes) {
-                // The terminal is closed; the dive continues.
+                // The terminal is closed, but the dive continues.
                 Ok(0) | Err(rustix::io::Errno::IO) => return,
                 Ok(count) => {
                     for key in keys(bytes.get(..count).unwrap_or_default()) {

@@ -3,7 +3,7 @@
 use super::frame::ScreenFrame;
 use super::keys::Key;
 
-/// A frame, a key, or the end.
+/// A message: a frame, a key, or the end.
 pub(super) enum Message {
     ScreenFrame(Box<ScreenFrame>),
     Key(Key),

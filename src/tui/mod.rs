@@ -1,7 +1,7 @@
-//! `--tui`: shows the dive on a terminal's whole screen, for a session over ssh.
+//! `--tui`: shows the dive on the whole screen of a terminal, for a session over ssh.
 //!
-//! The loop's thread passes frames by value when the renderer's thread requests one. In a live dive it never
-//! waits for the terminal.
+//! The renderer's thread requests a frame, and the loop's thread passes it by value. In a live dive, the
+//! loop's thread never waits for the terminal.
 
 mod alerts;
 mod draw;
@@ -44,7 +44,7 @@ use mode::Stop;
 use renderer::Renderer;
 use terminal_guard::TerminalGuard;
 
-/// Longest wait of a live dive for its terminal at the end.
+/// Longest wait for the terminal at the end of a live dive.
 const ENDS_WITHIN: Duration = Duration::from_secs(2);
 
 /// Parameters of the screen.
@@ -54,7 +54,7 @@ pub(crate) struct Start<'a> {
     /// First message.
     pub(crate) first: Option<String>,
     pub(crate) mode: Mode,
-    /// Set by Ctrl-C.
+    /// Flag that Ctrl-C sets.
     pub(crate) interrupted: Arc<AtomicBool>,
     /// Port for an operator's commands; `None` for a recorded dive.
     pub(crate) console: Option<ConsolePort>,
@@ -66,17 +66,17 @@ pub(crate) struct Tui {
     wanted: Arc<AtomicBool>,
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
-    /// Disconnected once the terminal is restored.
+    /// Disconnected when the terminal has been restored.
     done: Receiver<()>,
     is_live: bool,
 }
 
 impl Tui {
-    /// Prepares the handling of a second Ctrl-C, which restores the terminal and ends the program at once.
+    /// Prepares for a second Ctrl-C, which restores the terminal and ends the program at once.
     ///
-    /// Call it before the signal handlers are installed.
+    /// Call this function before the signal handlers are installed.
     ///
-    /// Errors: stdin or stdout is no terminal.
+    /// Errors: stdin or stdout is not a terminal.
     pub(crate) fn prepare() -> Result<(), Failure> {
         terminal_guard::check()?;
         interrupt::leave_second_to_keys();
@@ -108,14 +108,14 @@ impl Tui {
         Ok(Self { eye, wanted, sender: Some(sender), thread: Some(thread), done, is_live })
     }
 
-    /// Passes a frame on. In a live dive, content without room is in the next one.
+    /// Passes a frame to the renderer. In a live dive, if there is no room, the next frame has the content.
     fn show(&mut self, dive: &Loop, stopped: Option<Stop>) {
         let Some(sender) = &self.sender else { return };
         if self.is_live && sender.is_full() {
             return;
         }
         let shot = Message::ScreenFrame(Box::new(self.eye.shot(dive, stopped)));
-        // A thread that has stopped shows nothing more; it has logged the reason.
+        // If the renderer's thread has ended, nothing more is shown. The thread has logged the reason.
         let is_taken = if self.is_live { sender.try_send(shot).is_ok() } else { sender.send(shot).is_ok() };
         if !is_taken {
             self.eye.show_all_again();
@@ -168,7 +168,7 @@ impl Follower for Tui {
 }
 
 impl Tui {
-    /// Releases the terminal; in a live dive within [`ENDS_WITHIN`].
+    /// Releases the terminal. In a live dive this takes at most [`ENDS_WITHIN`].
     fn close(&mut self) {
         let Some(sender) = self.sender.take() else { return };
         terminal_guard::leave();

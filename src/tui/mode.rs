@@ -1,15 +1,15 @@
-//! Kind of dive shown, and its state.
+//! Kind and state of the dive that is shown.
 
 use crossbeam::channel::Sender;
 use headrace_replay::playback::PlaybackCommand;
 
 /// Kind of dive shown.
 pub(crate) enum Mode {
-    /// A dive on ports: no thread may wait.
+    /// A dive on ports. No thread may wait.
     Live,
     /// A simulated dive.
     Demo,
-    /// A dive from a log, at the speed of its playback.
+    /// A dive from a log, at the playback's speed.
     Source,
     /// A replay that takes commands, and its initial speed.
     Replay(Sender<PlaybackCommand>, Option<f64>),

@@ -17,12 +17,12 @@ use crate::output::append;
 
 /// Number of rows of the clock strips.
 pub(super) const CLOCK_ROWS: usize = HOURS;
-/// Width of a sensor's lamp with its age, and without.
+/// Columns of a sensor's lamp with the age of its data, and without it.
 const LAMP_COLUMNS: [usize; 2] = [24, 19];
 /// Width of the strips' labels.
 const LABEL: usize = 6;
 
-/// Draws the speed against v_max as a band, with the reason below.
+/// Draws the speed relative to v_max as a bar, with the reason below.
 pub(super) fn speed(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let is_known = is_now(shot);
@@ -35,7 +35,7 @@ pub(super) fn speed(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     if let (Some(speed_mps), Some(v_max_mps)) = (speed_mps, v_max_mps)
         && columns >= 10
     {
-        // The band ends at one and a half times v_max.
+        // The bar ends at one and a half times v_max.
         let share = |mps: f64| (mps.abs() / (1.5 * v_max_mps)).min(1.0);
         let at = |mps: f64| usize::try_from(math::round_to_i64(share(mps) * columns as f64)).unwrap_or(0);
         let (filled, mark) = (at(speed_mps), at(v_max_mps));
@@ -54,11 +54,11 @@ pub(super) fn speed(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     }
     rows.line(Line::from(spans));
     let mut parts: Vec<&str> = Vec::new();
-    // Losses are part of the status.
+    // Lost returns are part of the status already.
     if is_known && !shot.reason.is_empty() && state.lost_share().is_none() {
         parts.push(&shot.reason);
     }
-    // The first parts are in the banner.
+    // The banner shows the first parts already.
     let shown = if shot.status.action.is_empty() { 2 } else { 1 };
     parts.extend(shot.status.what.iter().skip(shown).map(String::as_str));
     rows.text(&one_line(&format!("WHY    {}", fitted(&parts, columns_after_label(rows)))), Style::default());
@@ -68,7 +68,7 @@ fn columns_after_label(rows: &Rows<'_>) -> usize {
     usize::from(rows.width()).saturating_sub(LABEL + 1)
 }
 
-/// As many of the first parts as fit whole.
+/// The first parts, as many as fit in full.
 fn fitted(parts: &[&str], columns: usize) -> String {
     let mut text = String::new();
     for part in parts {
@@ -81,12 +81,12 @@ fn fitted(parts: &[&str], columns: usize) -> String {
     text
 }
 
-/// Whether the state is current.
+/// Whether the state is up to date.
 pub(super) fn is_now(shot: &ScreenFrame) -> bool {
     !matches!(shot.state.condition(), Condition::Old(_) | Condition::NoData)
 }
 
-/// Draws position, its error, and the metres by verdict.
+/// Draws the position, its error, and the metres by verdict.
 pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let has_position = !matches!(state.position, PositionState::None(_));
@@ -102,15 +102,15 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
         }
         PositionState::None(_) => ("no position".to_owned(), Lamp::Red),
         PositionState::Doubtful(_) => {
-            (format!("doubtful: pass spacing {pm}{:.2} m", state.pass_sd_m), Lamp::Amber)
+            (format!("doubtful: {pm}{:.2} m between passes", state.pass_sd_m), Lamp::Amber)
         }
-        PositionState::Ok => (format!("ok: pass spacing {pm}{:.2} m", state.pass_sd_m), Lamp::Green),
+        PositionState::Ok => (format!("ok: {pm}{:.2} m between passes", state.pass_sd_m), Lamp::Green),
     };
     spans.push(Span::styled(format!("  {} {words}", ink.shape(lamp)), ink.style(lamp)));
     if let Some(sd) = state.sd.filter(|_| has_position) {
         let errors = format!("  {pm}{:.2} m along, {pm}{:.2} across", sd.along_m, sd.place_m);
         let used: usize = spans.iter().map(Span::width).sum();
-        // The errors are shown completely or not at all.
+        // The errors are shown in full or not at all.
         spans.extend(
             Some(errors)
                 .filter(|text| used + text.chars().count() <= usize::from(rows.width()))
@@ -122,7 +122,7 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
 }
 
-/// Metres by verdict, those not passed first. Dots mark omitted ones.
+/// Metres by verdict, with those that haven't passed first. Dots stand for omitted ones.
 fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let all = [
@@ -135,7 +135,7 @@ fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let mut text = format!("{:.2} m:", metres.way_m());
     for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
         let part = format!(" {part_m:.2} {what},");
-        // Leaves room for the dots.
+        // The dots need room, too.
         if text.len() + part.len() + 3 > columns {
             text += " ..";
             break;
@@ -145,7 +145,7 @@ fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     text.trim_end_matches([',', ':']).to_owned()
 }
 
-/// Lines of an alert. The action goes below the problem if there is no room next to it.
+/// Lines of an alert. If there is no room beside the problem, the action goes below it.
 fn alert_lines(alert: &AlertRow, ink: Palette, columns: usize) -> Vec<String> {
     let AlertRow { number, priority, state, lamp, text, advice, .. } = alert;
     let first = format!("{} {number} {priority} {state}: {text}", ink.shape(*lamp));
@@ -157,13 +157,13 @@ fn alert_lines(alert: &AlertRow, ink: Palette, columns: usize) -> Vec<String> {
     if whole.chars().count() <= columns {
         return vec![whole];
     }
-    // The action takes precedence over the last words of the problem.
+    // The action is more important than the last words of the problem.
     let mut lines = vec![wrapped(&first, columns).swap_remove(0)];
     lines.extend(wrapped(&format!("    {arrow} {advice}"), columns));
     lines
 }
 
-/// A text wrapped at blanks to lines of at most `columns` columns. Continuation lines are indented.
+/// Text wrapped at blanks to lines of at most `columns` columns. Continuation lines are indented.
 fn wrapped(text: &str, columns: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
@@ -181,18 +181,18 @@ fn wrapped(text: &str, columns: usize) -> Vec<String> {
     lines
 }
 
-/// Number of rows for all alerts.
+/// Number of rows needed for all alerts.
 pub(super) fn alert_rows(shot: &ScreenFrame, ink: Palette, columns: usize) -> usize {
     shot.alerts.iter().map(|alert| alert_lines(alert, ink, columns).len()).sum()
 }
 
-/// Draws alerts in `room` rows below a title with their numbers.
+/// Draws the alerts in `room` rows below a title that counts them.
 pub(super) fn alerts(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut Rows<'_>) {
     let columns = usize::from(rows.width());
     let (mut lines, mut shown) = (Vec::new(), 0);
     for alert in &shot.alerts {
         let of_it = alert_lines(alert, ink, columns);
-        // The problem takes precedence over the action.
+        // The problem is more important than the action.
         if lines.len() == room {
             break;
         }
@@ -221,14 +221,14 @@ pub(super) fn alerts(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut R
     }
 }
 
-/// Number of rows for this many sensors.
+/// Number of rows needed for this many sensors.
 pub(super) fn sensor_rows(sensors: usize, columns: usize) -> usize {
     sensors.div_ceil((columns / LAMP_COLUMNS[0]).max(1))
 }
 
-/// Draws sensor lamps with rate and age.
+/// Draws the sensors' lamps with rate and age.
 ///
-/// Faulty sensors come first, with a reason and in a row each while there is room.
+/// Faulty sensors come first. Each has a row of its own with a reason, as long as there is room.
 pub(super) fn sensors(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut Rows<'_>) {
     let unwell = shot.sensors.iter().filter(|sensor| sensor.state != SensorState::Ok).count();
     let columns = usize::from(rows.width());
@@ -291,8 +291,8 @@ fn age_text(age: DurNs) -> String {
     }
 }
 
-/// Draws the wall by section: holes against the target, verdicts, optionally a ruler and coverage by clock
-/// position.
+/// Draws the wall by section: holes relative to the target, and verdicts. A ruler and coverage by clock
+/// position are optional.
 pub(super) fn wall(
     wall: &Wall,
     extent: Extent,
@@ -349,7 +349,7 @@ fn known_style(known: Known, ink: Palette) -> Style {
     }
 }
 
-/// The hole in eighths of twice the target: half a column high is the target.
+/// Mark for a hole. Its height is in eighths, and half of it is the target.
 fn hole_mark(cell: Cell, ink: Palette) -> (char, Style) {
     let Some(share) = cell.share else {
         return (if cell.known == Known::Unseen { '·' } else { ' ' }, Palette::dim()).ascii(ink);
@@ -386,7 +386,7 @@ fn clock_mark(cell: Cell, hour: usize, ink: Palette) -> (char, Style) {
 }
 
 trait Ascii {
-    /// Replaces non-ASCII symbols if the terminal needs it.
+    /// Replaces non-ASCII symbols if the terminal can't show them.
     fn ascii(self, ink: Palette) -> Self;
 }
 
@@ -403,7 +403,7 @@ impl Ascii for (char, Style) {
     }
 }
 
-/// Stations below a strip, each at its column.
+/// Text with stations, each at its column below a strip.
 fn ruler_text(strip: &Strip) -> String {
     let mut text = " ".repeat(LABEL);
     let mut column = 0;
@@ -415,7 +415,7 @@ fn ruler_text(strip: &Strip) -> String {
     text
 }
 
-/// Digits of five rows with three columns each, from the most significant bit.
+/// Digits of five rows. The three bits of a row are its columns, from the most significant bit.
 const DIGITS: [[u8; 5]; 10] = [
     [7, 5, 5, 5, 7],
     [2, 6, 2, 2, 7],
@@ -429,7 +429,7 @@ const DIGITS: [[u8; 5]; 10] = [
     [7, 5, 7, 1, 7],
 ];
 
-/// Draws a number in large digits at the right of a banner of seven rows, with its unit below.
+/// Draws a number in large digits at the right of a banner of seven rows. Its unit is below the number.
 pub(super) fn large_digits(
     figure: &str,
     unit: &str,

@@ -1,4 +1,4 @@
-//! The renderer's thread: receives frames and keys, and requests the next frame once it has drawn one.
+//! The renderer's thread receives frames and keys. When it has drawn a frame, it requests the next one.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -25,7 +25,7 @@ use crate::play::{Hand, Key as PlaybackKey};
 
 /// Interval between two draws.
 const EVERY: Duration = Duration::from_millis(100);
-/// Delay after which a live dive's frame is shown as stale. Source: `OLD_AFTER` of the live state.
+/// Delay after which a live dive's frame is shown as stale. It equals `OLD_AFTER` of the live state.
 const OLD_AFTER: Duration = Duration::from_secs(2);
 
 /// Draws frames and handles keys.
@@ -39,7 +39,7 @@ pub(super) struct Renderer {
     is_live: bool,
     wanted: Arc<AtomicBool>,
     keys_end: Arc<AtomicBool>,
-    /// Time of the last frame.
+    /// Time at which the last frame came.
     came: Option<Instant>,
 }
 
@@ -67,7 +67,7 @@ impl Renderer {
         Self { hold, desk, page, hand, commands, is_live, wanted, keys_end, came: None }
     }
 
-    /// Draws until the end, then releases the terminal.
+    /// Draws until the end of the dive, then releases the terminal.
     pub(super) fn draw_until_the_end(mut self, messages: &Receiver<Message>) {
         let mut screen: Option<(Screen, (u16, u16))> = None;
         let mut drawn: Option<Instant> = None;
@@ -75,7 +75,7 @@ impl Renderer {
             let waiting = drawn.map_or(Duration::ZERO, |drawn| EVERY.saturating_sub(drawn.elapsed()));
             match messages.recv_timeout(waiting) {
                 Ok(Message::End) | Err(RecvTimeoutError::Disconnected) => break,
-                // A key is handled and drawn at once, so its answer isn't delayed.
+                // A key is handled and drawn at once, so that its answer isn't delayed.
                 Ok(Message::Key(key)) => {
                     self.key(key);
                     drawn = None;
@@ -88,7 +88,7 @@ impl Renderer {
                 Err(RecvTimeoutError::Timeout) => {}
             }
             self.refresh();
-            // A closed or failing terminal is tried again.
+            // After an error the terminal is tried again at the next draw.
             if let Err(error) = self.draw(&mut screen) {
                 tracing::debug!(%error, "the screen isn't drawn");
                 screen = None;

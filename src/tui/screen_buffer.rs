@@ -1,4 +1,4 @@
-//! Screen buffer: colours and shapes, and rows of the screen.
+//! Screen buffer: colours, shapes, and rows of the screen.
 
 use headrace_monitor::live_state::Lamp;
 use ratatui::buffer::Buffer;
@@ -19,7 +19,7 @@ impl Palette {
         Self { colour: terminal::of(&std::io::stdout()).colour, unicode: terminal::has_unicode() }
     }
 
-    /// Shape of a lamp, which distinguishes it without colour.
+    /// Shape of a lamp. Lamps can be told apart by shape without colour.
     pub(super) fn shape(self, lamp: Lamp) -> &'static str {
         match (lamp, self.unicode) {
             (Lamp::Green, true) => "●",
@@ -59,7 +59,7 @@ impl Palette {
     }
 }
 
-/// Rows that are filled from the top down.
+/// Rows of the screen that are filled from the top down.
 pub(super) struct Rows<'a> {
     pub(super) to: &'a mut Buffer,
     pub(super) top: u16,
@@ -87,7 +87,7 @@ impl Rows<'_> {
         self.line(Line::styled(text.to_owned(), style));
     }
 
-    /// Draws a panel's title, followed by a rule.
+    /// Draws the title of a panel, followed by a horizontal rule.
     pub(super) fn title(&mut self, title: &str, ink: Palette) {
         let rule = if ink.unicode { "─" } else { "-" };
         let behind = usize::from(self.width()).saturating_sub(title.chars().count() + 1);

@@ -1,4 +1,4 @@
-//! Takes over the terminal: raw mode on the alternate screen, restored on every exit.
+//! Takes over the terminal: raw mode on the alternate screen. Every exit restores the terminal.
 
 use std::fs::File;
 use std::io::{self, IsTerminal as _, Write as _};
@@ -21,21 +21,24 @@ pub(super) const ARTIST: &str = "screen";
 const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
 /// Restores the main screen.
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
-/// Polling interval of another thread that waits for the renderer to release the terminal.
+/// Interval at which another thread checks whether the renderer has released the terminal.
 const STEP: Duration = Duration::from_millis(25);
 const STEPS: u32 = 20;
 
-/// Settings before the terminal was taken over.
+/// Terminal settings before the terminal was taken over.
 static BEFORE: OnceLock<Termios> = OnceLock::new();
 /// Whether the terminal is taken over.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 /// Whether the terminal has to be released.
 static LEAVING: AtomicBool = AtomicBool::new(false);
 
-/// The terminal for drawing. Writing bypasses stdout's lock, so an unread terminal blocks no other writer.
+/// The terminal, for drawing. Writing bypasses the lock of stdout, so an unread terminal blocks no other
+/// writer.
 pub(super) struct TerminalGuard(File);
 
-/// Checks the terminal. Errors: stdin or stdout is no terminal, or one without an alternate screen.
+/// Checks the terminal.
+///
+/// Errors: stdin or stdout is not a terminal, or the terminal has no alternate screen.
 pub(super) fn check() -> Result<(), Failure> {
     let able = crate::terminal::of(&io::stdout()).overwrites && io::stdin().is_terminal();
     let why = "--tui needs a terminal on stdin and stdout (and TERM other than dumb); over ssh: ssh -t";
@@ -48,7 +51,8 @@ impl TerminalGuard {
         let out = File::from(io::stdout().as_fd().try_clone_to_owned()?);
         let before = tcgetattr(io::stdin())?;
         let mut raw = before.clone();
-        // Ctrl-C, Ctrl-Z and Ctrl-\ become keys. Ctrl-S and Ctrl-Q still stop and start the terminal.
+        // Ctrl-C, Ctrl-Z and Ctrl-\ are read as keys. Ctrl-S and Ctrl-Q still stop and start the terminal's
+        // output.
         raw.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG | LocalModes::IEXTEN);
         raw.special_codes[SpecialCodeIndex::VMIN] = 1;
         raw.special_codes[SpecialCodeIndex::VTIME] = 0;
@@ -82,7 +86,7 @@ impl Drop for TerminalGuard {
     }
 }
 
-/// Requests that the renderer's thread releases the terminal.
+/// Requests that the renderer's thread release the terminal.
 pub(super) fn leave() {
     LEAVING.store(true, Ordering::Relaxed);
 }
@@ -92,7 +96,7 @@ pub(super) fn is_leaving() -> bool {
     LEAVING.load(Ordering::Relaxed)
 }
 
-/// Restores the settings, which takes no time whatever the terminal does.
+/// Restores the settings. This takes no time, whatever the terminal does.
 pub(super) fn restore_settings() {
     if let Some(before) = BEFORE.get()
         && let Err(error) = tcsetattr(io::stdin(), OptionalActions::Now, before)
@@ -106,12 +110,12 @@ pub(super) fn restore() {
     if TAKEN.swap(false, Ordering::Relaxed) {
         restore_settings();
         let mut out = io::stdout().lock();
-        // A closed terminal needs no restoring.
+        // A closed terminal needs no restoring, so the error is ignored.
         out.write_all(LEAVE).and_then(|()| out.flush()).ok();
     }
 }
 
-/// Restores the terminal from a thread other than the renderer's, within half a second.
+/// Restores the terminal within half a second, from a thread other than the renderer's.
 pub(super) fn restore_from_elsewhere() {
     leave();
     for _ in 0..STEPS {
@@ -121,7 +125,7 @@ pub(super) fn restore_from_elsewhere() {
         thread::sleep(STEP);
     }
     restore_settings();
-    // The terminal may not read its input, so the wait is limited.
+    // If the terminal reads nothing, writing blocks, so the wait for it is limited.
     let writing = thread::spawn(restore);
     for _ in 0..STEPS {
         if writing.is_finished() {
@@ -131,9 +135,9 @@ pub(super) fn restore_from_elsewhere() {
     }
 }
 
-/// Installs a panic hook that restores the terminal before a fatal panic is printed.
+/// Installs a panic hook. It restores the terminal before the text of a fatal panic is printed.
 ///
-/// A panic of another thread becomes a line on the screen.
+/// A panic of any other thread becomes a line on the screen.
 fn mind_panics() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -163,7 +167,7 @@ mod tests {
     const THREAD: &str = "HEADRACE_TEST_THREAD";
     const WORDS: &str = "a panic on purpose";
 
-    /// Run by [`panic_restores_the_terminal`] in a process with its own terminal.
+    /// Runs in a process with its own terminal. [`panic_restores_the_terminal`] starts that process.
     #[test]
     #[ignore = "takes the terminal, and panics"]
     fn panics_with_the_terminal_taken() {
@@ -174,9 +178,9 @@ mod tests {
         assert!(tcgetwinsize(&hold.0).is_ok());
     }
 
-    /// Output of a process whose thread of that name panics with the terminal taken over.
+    /// Output of a process in which the thread with this name panics while the terminal is taken over.
     ///
-    /// Also returns whether the terminal's settings are as before.
+    /// Also returns whether the terminal's settings are the same afterwards.
     fn written(thread: &str) -> (String, bool) {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&master).unwrap();
@@ -199,7 +203,7 @@ mod tests {
         let mut master = File::from(master);
         let reading = thread::spawn(move || {
             let (mut all, mut bytes) = (Vec::new(), [0; 4096]);
-            // The end of a terminal without an open handle is an error.
+            // When all handles of a pseudo-terminal are closed, reading returns an error at its end.
             while let Ok(count @ 1..) = master.read(&mut bytes) {
                 all.extend_from_slice(&bytes[..count]);
             }
@@ -219,7 +223,8 @@ mod tests {
             written.find(text).unwrap_or_else(|| panic!("{text:?} in {written:?}"))
         };
         let [enter, leave] = [ENTER, LEAVE].map(|bytes| std::str::from_utf8(bytes).unwrap());
-        // A panic of the renderer or the loop: its text is on the main screen, after the switch back to it.
+        // If the renderer or the loop panics, the text appears on the main screen, after the switch back to
+        // it.
         for thread in [ARTIST, "main"] {
             let (written, same) = written(thread);
             assert!(same, "{thread}: the settings are others");
@@ -227,8 +232,8 @@ mod tests {
             assert!(at(&written, leave) < at(&written, WORDS), "{thread}: {written:?}");
             assert_eq!(written.matches(leave).count(), 1, "{thread}: {written:?}");
         }
-        // A panic of another thread is a line of the log. The terminal stays taken over until its owner
-        // releases it.
+        // If another thread panics, the text becomes a line of the log. The terminal stays taken over until
+        // its owner releases it.
         let (written, same) = written("line 0");
         assert!(same && at(&written, enter) < at(&written, leave), "{written:?}");
         assert!(!written.contains(WORDS), "{written:?}");

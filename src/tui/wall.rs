@@ -1,19 +1,19 @@
-//! The wall by section: its data in a frame, and the strips drawn from it.
+//! The wall by section: its data in a frame, and the strips that are drawn from the data.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::run::Loop;
 
-/// Number of parts of the perimeter with a known clock position.
+/// Number of parts into which the perimeter is divided for clock positions.
 const PARTS: usize = 96;
-/// Hours of the clock.
+/// Number of hours of the clock.
 pub(super) const HOURS: usize = 12;
 
 /// Clock positions by arc length.
 pub(super) struct Clock {
     part_m: f64,
-    /// Bit of the hour, for each part.
+    /// Bit of the clock hour of each part.
     bits: [u16; PARTS],
 }
 
@@ -33,33 +33,35 @@ impl Clock {
     }
 }
 
-/// Knowledge of a section. If a column represents several sections, the later variant wins.
+/// State of a section on the screen.
+///
+/// If a column shows several sections, the variant that comes last in this list wins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub(super) enum Known {
     /// No sample.
     #[default]
     Unseen,
     Pass,
-    /// Further driving may still fill it.
+    /// Further driving may still fill the section.
     Open,
     NotInspected,
     CannotSay,
-    /// Fails, or is flagged.
+    /// The section fails, or is flagged.
     Missed,
 }
 
-/// A section.
+/// A section on the screen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Cell {
     pub(super) known: Known,
     /// Hole as a share of the target.
     pub(super) share: Option<f64>,
-    /// Clock hours with samples within half the target: bit 0 is 12 o'clock.
+    /// Clock hours that have samples within half the target. Bit 0 is 12 o'clock.
     pub(super) seen: u16,
 }
 
 impl Cell {
-    /// Section with this index; `None` if there is none.
+    /// Section with this index; `None` if there is no such section.
     pub(super) fn of(index: i64, dive: &Loop, clock: &Clock) -> Option<Self> {
         let coverage = dive.coverage();
         let sections = &coverage.sections;
@@ -75,8 +77,8 @@ impl Cell {
         };
         let mut seen = 0;
         if section.samples > 0 {
-            // A hole that passes is no wider than the target, so wall within half the target of a sample is
-            // covered.
+            // A passing hole is at most as wide as the target, so wall within half the target of a sample
+            // counts as covered.
             let (from_m, to_m) = sections.bounds_m(index);
             let (from_m, to_m) = (from_m - sections.target_m() / 2.0, to_m + sections.target_m() / 2.0);
             coverage.store.each_between(from_m, to_m, |x_m, arc_m, _| {
@@ -85,7 +87,7 @@ impl Cell {
                 }
             });
         }
-        // Around a hole that is too large, the hour isn't covered, with or without samples.
+        // At the clock position of a hole that is too large, the hour counts as not covered.
         if let Some(hole) = section.hole.filter(|_| matches!(known, Known::Missed | Known::CannotSay)) {
             seen &= !clock.bit(hole.arc_m);
         }
@@ -102,24 +104,24 @@ impl Cell {
     }
 }
 
-/// Data on the wall in a frame.
+/// Data on the wall within a frame.
 pub(super) struct WallNews {
     pub(super) section_m: f64,
     pub(super) count: usize,
-    /// Place of the vehicle.
+    /// Place of the vehicle, m; `None` without a position.
     pub(super) at_m: Option<f64>,
-    /// Whether it moves inwards.
+    /// Whether the vehicle moves inwards.
     pub(super) inwards: bool,
     pub(super) cells: Vec<(i64, Cell)>,
 }
 
-/// Part of the wall that is shown.
+/// Part of the wall that the screen shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Extent {
-    /// One section per column, around the vehicle.
+    /// One section per column, near the vehicle.
     #[default]
     Near,
-    /// Whole coverage extent.
+    /// The whole coverage extent.
     Way,
     Tunnel,
 }
@@ -142,12 +144,12 @@ impl Extent {
     }
 }
 
-/// The wall as far as it is known.
+/// The wall, with all sections known so far.
 #[derive(Default)]
 pub(super) struct Wall {
     section_m: f64,
     at_m: Option<f64>,
-    /// Last place of the vehicle, around which the wall is shown.
+    /// Last place of the vehicle, m. The wall is shown around this place.
     middle_m: f64,
     inwards: bool,
     cells: Vec<Cell>,
@@ -155,12 +157,12 @@ pub(super) struct Wall {
 
 /// Columns of a strip.
 pub(super) struct Strip {
-    /// `None` beyond the tunnel.
+    /// Columns; `None` for those beyond the tunnel.
     pub(super) columns: Vec<Option<Cell>>,
-    /// Chainage of the first column's beginning, and the length of each, m.
+    /// Chainage at which the first column begins, and length of a column, m.
     pub(super) from_m: f64,
     pub(super) column_m: f64,
-    /// Column of the vehicle, and whether it goes to the right.
+    /// Column of the vehicle, and whether the vehicle moves to the right.
     pub(super) vehicle: Option<(usize, bool)>,
 }
 
@@ -176,7 +178,7 @@ impl Wall {
         }
     }
 
-    /// A strip of `columns` columns.
+    /// Strip of `columns` columns.
     pub(super) fn strip(&self, extent: Extent, columns: usize) -> Strip {
         let columns = columns.max(1);
         let section_of = |x_m: f64| math::floor_to_i64(x_m / self.section_m.max(1e-9));
@@ -186,7 +188,7 @@ impl Wall {
                 let seen = |cell: &Cell| cell.known != Known::Unseen;
                 let first = self.cells.iter().position(seen).unwrap_or(0);
                 let last = self.cells.iter().rposition(seen).map_or(1, |last| last + 1);
-                // Never finer than a section per column.
+                // A column shows at least one section.
                 let each = (last.saturating_sub(first)).div_ceil(columns).max(1);
                 (first as i64, each)
             }
@@ -208,8 +210,9 @@ impl Wall {
         }
     }
 
-    /// First section of a strip around the vehicle. It moves in quarters, so the wall is stationary in
-    /// between.
+    /// First section of a strip around the vehicle.
+    ///
+    /// The strip moves by quarters of its width, so the picture is stationary in between.
     fn near(&self, here: i64, columns: usize) -> i64 {
         let step = (columns as i64 / 4).max(1);
         let from = here.div_euclid(step) * step - 2 * step + if self.inwards { 0 } else { step };
@@ -242,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn column_shows_its_worst_section_and_common_coverage() {
+    fn column_shows_the_worst_section_and_the_hours_covered_in_all() {
         let strip = wall(100, 2.0).strip(Extent::Tunnel, 50);
         assert_eq!((strip.columns.len(), strip.column_m), (50, 1.0));
         let first = strip.columns[0].unwrap();
@@ -253,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn strip_contains_the_vehicle_and_ends_with_the_tunnel() {
+    fn strip_contains_the_vehicle_and_has_no_columns_beyond_the_tunnel() {
         for (at_m, count) in [(0.0, 400), (47.3, 400), (199.9, 400), (3.0, 20)] {
             let strip = wall(count, at_m).strip(Extent::Near, 60);
             let (column, _) = strip.vehicle.unwrap();

@@ -7,7 +7,7 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::advice::Advice;
 
-/// Period of the advice, in data time.
+/// Time between two updates of the advice, in data time.
 pub const ADVICE_PERIOD: DurNs = DurNs(200_000_000);
 
 /// One entry of the advice history.
@@ -23,10 +23,11 @@ pub struct AdviceEntry {
     pub advice: Advice,
 }
 
-/// Advice history: gets an entry whenever the advice has changed significantly, or after ten seconds.
+/// Advice history.
 ///
-/// When it is full, every other entry is dropped and the minimum time between entries is doubled. A longer
-/// dive is thus logged more coarsely from beginning to end.
+/// An entry is added when the advice has changed significantly, or after ten seconds. When the history is
+/// full, every other entry is dropped and the minimum time between entries is doubled. A longer dive is thus
+/// logged more coarsely from beginning to end.
 #[derive(Debug, Clone, Resource)]
 pub struct AdviceLog {
     /// The entries, in order.
@@ -46,7 +47,7 @@ impl Default for AdviceLog {
 }
 
 impl AdviceLog {
-    /// An entry takes some 400 bytes.
+    /// Maximum number of entries. An entry takes about 400 bytes.
     const CAPACITY: usize = 1 << 13;
     const EVERY: DurNs = DurNs(10_000_000_000);
     const CHANGE_MPS: f64 = 0.01;

@@ -1,9 +1,9 @@
 //! List of alerts with the life cycle of IMO MSC.302(87): raised, acknowledged, silenced, rectified, cleared.
 //!
-//! Each situation has one alert, whose number never changes. Conditions are checked at each update, missed
-//! stretches when they are judged, and commands take effect where they were consumed. The list is therefore
-//! the same in a replay, however the stream was cut into ticks. It holds figures, no texts: [`words`] makes
-//! the texts for display. `docs/reference/alerts.md` has the table.
+//! Each situation has one alert, whose number never changes. Conditions are checked at each update. Missed
+//! stretches are added when their sections are judged. Commands take effect at their place in the packet
+//! stream. The list is therefore the same in a replay, however the stream was cut into ticks. The list holds
+//! figures, no texts: [`words`] makes the texts for display. `docs/reference/alerts.md` has the table.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -34,8 +34,8 @@ pub(super) use runs::RunInput;
 pub use texts::TextContext;
 use timer::Timer;
 
-/// Maximum number of alerts kept. Beyond it the oldest cleared ones are dropped, and neighbouring missed
-/// stretches share an alert.
+/// Maximum number of alerts kept. Beyond this number the oldest cleared alerts are dropped, and neighbouring
+/// missed stretches share an alert.
 pub const MOST_LISTED: usize = 256;
 /// Time for which a sound is silenced. Source: MSC.302(87).
 pub const SILENCE: DurNs = DurNs(30_000_000_000);
@@ -44,9 +44,9 @@ pub const SILENCE: DurNs = DurNs(30_000_000_000);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlertState {
-    /// Its condition holds.
+    /// The alert's condition holds.
     Active,
-    /// Its condition no longer holds, but nobody has acknowledged the alert yet.
+    /// The condition no longer holds, but nobody has acknowledged the alert yet.
     Rectified,
     /// The alert has ended.
     Cleared,
@@ -56,17 +56,17 @@ pub enum AlertState {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlertChange {
-    /// It is new, or its condition holds again.
+    /// The alert is new, or its condition holds again.
     Raised,
-    /// Somebody has acknowledged it.
+    /// Somebody has acknowledged the alert.
     Acknowledged,
-    /// Its sound is silenced for a while.
+    /// The alert's sound is silenced for a while.
     Silenced,
-    /// Its condition no longer holds, and it waits for acknowledgement.
+    /// The condition no longer holds, and the alert waits for acknowledgement.
     Rectified,
-    /// It has ended.
+    /// The alert has ended.
     Cleared,
-    /// Its place, extent, figures or priority have changed.
+    /// The alert's place, extent, figures or priority have changed.
     Changed,
 }
 
@@ -84,23 +84,24 @@ impl AlertChange {
     }
 }
 
-/// Person who acknowledged an alert, and the time.
+/// Acknowledgement of an alert: person and time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Acknowledgement {
     /// Person or device.
     pub by: Who,
-    /// Time.
+    /// Time of the acknowledgement.
     pub at: MonoNs,
 }
 
 /// Figures for an alert's texts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Figures {
-    /// None.
+    /// No figures.
     None,
-    /// Missed stretch: causes, arc length of the largest hole, m, and the speed advised when raised, m/s.
+    /// Missed stretch: causes, arc length of the largest hole, m, and the speed advised when the alert was
+    /// raised, m/s.
     ///
-    /// The speed is zero if there was none.
+    /// The speed is zero if no speed was advised.
     Missed(CauseFigures, f64, f64),
     /// Stretch without a verdict.
     CannotSay(Stretch),
@@ -108,9 +109,9 @@ pub enum Figures {
     Advice(AdviceFigures),
     /// Missing requirements for a position.
     MissingSampleFinder(NoFix),
-    /// Position error, m, and whether standing still would help.
+    /// Position error, m, and whether staying stationary would reduce it.
     Error(f64, bool),
-    /// Alert about the dive as a whole: place and largest deviation, m.
+    /// Alert about the dive as a whole: place, m, and largest deviation, m.
     Deviation(f64, f64),
     /// A doubtful setting, and the place where the doubt arose, m.
     Setting(SettingDoubt, f64),
@@ -118,10 +119,10 @@ pub enum Figures {
     Left(f64),
 }
 
-/// An alert of the list.
+/// An alert in the list.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ListedAlert {
-    /// Number from 1. It is never reused.
+    /// Number from 1; never reused.
     pub number: u32,
     /// Kind.
     pub kind: ListKind,
@@ -129,44 +130,46 @@ pub struct ListedAlert {
     pub priority: Priority,
     /// State in its life cycle.
     pub state: AlertState,
-    /// Time of its first raising.
+    /// Time at which the alert was first raised.
     pub since: MonoNs,
-    /// Time from which its condition no longer holds.
+    /// Time at which the condition ceased to hold.
     pub rectified: Option<MonoNs>,
-    /// Time at which it ended.
+    /// Time at which the alert ended.
     pub cleared: Option<MonoNs>,
     /// Acknowledgement, if any.
     pub acknowledged: Option<Acknowledgement>,
-    /// Time until which its sound is silenced.
+    /// Time until which the alert's sound is silenced.
     pub silenced_until: Option<MonoNs>,
-    /// Sensor that it names.
+    /// Sensor that the alert names.
     pub source: Option<SourceId>,
-    /// Index of its first section, and index after its last.
+    /// Index of the stretch's first section, and index after its last section.
     pub stretch: Option<(i64, i64)>,
-    /// Place of the vehicle when it was raised, m; `None` for an alert with a stretch.
+    /// Place of the vehicle when the alert was raised, m; `None` for an alert with a stretch.
     pub x_m: Option<f64>,
-    /// Number of times that it was raised; for missed stretches, number of stretches that it represents.
+    /// Number of times that the alert was raised. For missed stretches: number of stretches that the alert
+    /// represents.
     pub count: u32,
-    /// Number of open runs of flagged sections in it.
+    /// Number of runs of flagged sections in the alert that aren't cleared yet.
     pub(super) open_runs: u32,
-    /// Alert that it was merged into.
+    /// Number of the alert into which this alert was merged.
     pub merged_into: Option<u32>,
-    /// Figures for its texts.
+    /// Figures for the alert's texts.
     pub figures: Figures,
 }
 
 impl ListedAlert {
-    /// Whether it has not ended.
+    /// Whether the alert is live: it has not ended.
     pub fn is_live(&self) -> bool {
         self.state != AlertState::Cleared
     }
 
-    /// Whether somebody must still acknowledge it.
+    /// Whether somebody must still acknowledge the alert.
     pub fn needs_acknowledgement(&self) -> bool {
         self.is_live() && self.priority != Priority::Caution && self.acknowledged.is_none()
     }
 
-    /// Whether it sounds at `now`: its condition holds, and it is neither acknowledged nor silenced.
+    /// Whether the alert sounds at `now`. Its condition holds then, and nobody has acknowledged or silenced
+    /// the alert.
     pub fn sounds(&self, now: MonoNs) -> bool {
         let is_silenced = self.silenced_until.is_some_and(|until| now < until);
         self.state == AlertState::Active && self.needs_acknowledgement() && !is_silenced
@@ -196,13 +199,13 @@ pub struct AlertList {
     raised: u32,
     /// Number of cleared alerts no longer kept.
     dropped: u64,
-    /// For each run of flagged sections: the number of its alert, or zero.
+    /// Number of each run's alert, or zero, by run of flagged sections.
     by_run: Vec<u32>,
     /// Timers, by situation.
     timers: Vec<Timer>,
     /// Time of the first update.
     begun: Option<MonoNs>,
-    /// Conditions seen at least once, for [`observed`].
+    /// Data and positions seen so far.
     had: conditions::Had,
     /// Largest speed advised at the last update, m/s; zero if none.
     v_max_mps: f64,
@@ -222,9 +225,10 @@ stateful!(AlertList {
 });
 
 impl AlertList {
-    /// An empty list. `sections` is the number of sections, and so the largest possible number of runs.
+    /// Creates an empty list. `sections` is the number of sections, and so the largest possible number of
+    /// runs.
     ///
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory of the list.
     pub(super) fn new(timing: AlertTiming, limits: LimitsConfig, sections: usize) -> Self {
         Self {
             alerts: Vec::with_capacity(MOST_LISTED),
@@ -248,7 +252,7 @@ impl AlertList {
         self.alerts.iter()
     }
 
-    /// Alert with a number.
+    /// Alert with this number.
     pub fn get(&self, number: u32) -> Option<&ListedAlert> {
         self.alerts.get(self.place_of(number)?)
     }

@@ -16,9 +16,9 @@ pub enum AlertKind {
     OutsideTunnel,
     /// Most samples of a section deviate from the design profile by more than the contradiction limit.
     ProfileContradicted,
-    /// Successive returns of a head disagree: noise.
+    /// Successive returns of a head disagree: they are noise.
     HeadScattered,
-    /// A head's range doesn't change although the vehicle's place says it must.
+    /// A head's range stays constant although it must change at the vehicle's place.
     HeadConstant,
     /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
@@ -30,7 +30,8 @@ pub enum AlertKind {
 
 /// Number of kinds that name a head.
 const HEAD_KINDS: usize = 3;
-/// Maximum number of alerts: one per kind, or per kind and head, and one for the cable and a velocity log.
+/// Maximum number of alerts: one per kind, or per kind and head. The cable counter may also differ from a
+/// velocity log.
 pub const MOST_ALERTS: usize = AlertKind::ALL.len() + 1 - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
 
 impl AlertKind {
@@ -45,7 +46,7 @@ impl AlertKind {
         Self::SettingDoubted,
     ];
 
-    /// Alert for a distrusted head, and its figure, m.
+    /// Alert for a distrusted head, and the alert's figure, m.
     pub(super) fn of_distrust(why: Distrust) -> (Self, f64) {
         match why {
             Distrust::Scattered(jump_m) => (Self::HeadScattered, jump_m),
@@ -73,21 +74,22 @@ impl AlertKind {
 pub struct Alert {
     /// Kind.
     pub kind: AlertKind,
-    /// Time of its first occurrence.
+    /// Time of the alert's first occurrence.
     pub since: MonoNs,
-    /// Time at which its latest occurrence began.
+    /// Time at which the alert's latest occurrence began.
     pub latest: MonoNs,
     /// Number of occurrences.
     ///
-    /// They are samples outside, judgements of contradicting sections, or times that a head or the cable
-    /// counter was distrusted.
+    /// An occurrence is a sample outside the tunnel, a judgement of a contradicting section, or the beginning
+    /// of distrust in a head or the cable counter.
     pub count: u64,
-    /// Chainage of its first occurrence, m.
+    /// Chainage of the alert's first occurrence, m.
     pub x_m: f64,
-    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    /// Largest deviation, m.
     ///
-    /// For a head: the mean between successive returns, its constant range, or its mean deviation from the
-    /// design. For the cable counter: the largest difference from the other source.
+    /// Outside the tunnel: distance from its end. Contradicted profile: mean deviation of a section from the
+    /// design. Head: mean difference between successive returns, constant range, or mean deviation from the
+    /// design. Cable counter: difference from the other source.
     pub worst_m: f64,
     /// The distrusted head, or the velocity log that the cable counter differs from.
     pub source: Option<SourceId>,
@@ -100,13 +102,14 @@ pub struct Alert {
 pub struct Alerts([Option<Alert>; MOST_ALERTS]);
 
 impl Alerts {
-    /// Records an alert at a chainage with its deviation, m. True on its first occurrence.
+    /// Records an alert at a chainage with its deviation, m. Returns true on the first occurrence.
     pub fn note(&mut self, kind: AlertKind, at: MonoNs, x_m: f64, off_m: f64) -> bool {
         self.note_of(None, kind, at, x_m, off_m)
     }
 
-    /// Records an alert about a head, or about the velocity log that the cable differs from. True on its
-    /// first occurrence.
+    /// Records an alert about a head, or about the velocity log that the cable counter differs from.
+    ///
+    /// Returns true on the first occurrence.
     pub fn note_of(
         &mut self,
         source: Option<SourceId>,
@@ -136,8 +139,10 @@ impl Alerts {
         is_first
     }
 
-    /// Records an occurrence that began at `since` and lasts. It is counted once. True when the first one is
-    /// first recorded.
+    /// Records a lasting occurrence that began at `since`. Later calls for the same occurrence don't count
+    /// again.
+    ///
+    /// Returns true when the first occurrence is first recorded.
     pub fn note_lasting(
         &mut self,
         source: Option<SourceId>,
@@ -155,8 +160,9 @@ impl Alerts {
         }
     }
 
-    /// Records a doubtful setting, found at a chainage, m. Counts it, and returns true, if another setting
-    /// becomes the likeliest.
+    /// Records a doubtful setting, found at a chainage, m.
+    ///
+    /// If another setting becomes the likeliest, counts an occurrence and returns true.
     pub fn note_setting(&mut self, at: MonoNs, x_m: f64, doubt: &SettingDoubt) -> bool {
         let kind = AlertKind::SettingDoubted;
         let is_new = self

@@ -1,4 +1,4 @@
-//! Builder of the loop: sources, sensors, plugins.
+//! Builder of the loop: sources, sensors and plugins.
 
 use bevy_ecs::component::Mutable;
 use bevy_ecs::entity::Entity;
@@ -21,7 +21,7 @@ use headrace_vehicle::{CONSOLE_ID, Mission};
 
 /// A source of bytes, as a plugin registers it.
 pub struct SourceSpec {
-    /// Name, also that of its channel in the log.
+    /// Name of the source, and of its channel in the log.
     pub id: String,
     /// Kind of device.
     pub plugin: String,
@@ -29,7 +29,7 @@ pub struct SourceSpec {
     pub connect: String,
     /// Decoder from bytes to readings.
     pub decoder: Box<dyn Decoder>,
-    /// Capacity of the ring before the loop, bytes.
+    /// Capacity of the source's ring, bytes.
     pub ring_bytes: usize,
 }
 
@@ -46,7 +46,7 @@ pub struct SourceInfo {
 
 /// An addition to the loop, such as an outlet or a stage.
 pub trait Plugin {
-    /// Registers sources, components, systems in a named stage, outlets.
+    /// Registers sources, components, systems in a named stage, and outlets.
     ///
     /// Errors: a requirement of the plugin is missing or duplicated.
     fn build(&self, app: &mut App) -> Result<(), PluginError>;
@@ -62,12 +62,12 @@ pub struct App {
     pub(super) entities: Vec<Entity>,
     pub(super) ports: Vec<Port>,
     pub(super) readers: Vec<PortReader>,
-    /// Whether a plugin has systems in the stages that place pings.
+    /// Whether a plugin has systems in the stages that georeference pings.
     pub(super) has_own_placing: bool,
 }
 
 impl App {
-    /// A loop without sources.
+    /// Creates a loop without sources.
     pub fn new(mission: Mission) -> Self {
         let mut schedule = stage::schedule();
         stages::add(&mut schedule);
@@ -93,9 +93,9 @@ impl App {
         Ok(self)
     }
 
-    /// Registers a source. Its port fills the ring that the loop reads.
+    /// Registers a source, and creates the ring that its port fills and the loop reads.
     ///
-    /// Errors: the id exists already or is the console's, or there are more than [`MAX_SOURCES`].
+    /// Errors: the id exists already or is reserved for the console, or there are more than [`MAX_SOURCES`].
     pub fn add_source(&mut self, spec: SourceSpec) -> Result<SourceId, PluginError> {
         if spec.id == CONSOLE_ID {
             return Err(PluginError::ReservedSource { id: spec.id });
@@ -155,7 +155,7 @@ impl App {
         self.world.insert_resource(resource);
     }
 
-    /// Keeps the result words of every tick, for recording or comparison.
+    /// Keeps the published words of every tick, for recording or comparison.
     pub fn keep_results(&mut self) {
         let mut digests = Digests::default();
         digests.keep();
@@ -168,8 +168,7 @@ impl App {
         self.schedule.add_systems(systems.in_set(stage));
     }
 
-    /// Adds systems between a stage and the next, for systems such as measurements that need the finished
-    /// stage.
+    /// Adds systems between a stage and the next, such as measurements of the finished stage.
     pub fn add_systems_after<M>(
         &mut self,
         stage: Stage,

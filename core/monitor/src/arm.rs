@@ -42,16 +42,17 @@ use headrace_vehicle::Mission;
 /// Capacity for the readings of one tick. The shortest frame of any device has over ten bytes.
 const MAX_TICK_READINGS: usize = MAX_TICK_BYTES / 8;
 
-/// Margin beyond both ends of the tunnel for heads mounted ahead of or behind the vehicle's origin, m.
+/// Margin of the sample store beyond both ends of the tunnel, m. It covers heads mounted ahead of or behind
+/// the vehicle's origin.
 const ROOM_BEYOND_M: f64 = 25.0;
 /// Sample capacity per metre of tunnel. Four heads at 0.2 m/s give 1,000 per metre.
 const SAMPLES_PER_M: f64 = 4_000.0;
 const MIN_SAMPLES: f64 = 4_000_000.0;
 const MAX_SAMPLES: f64 = 40_000_000.0;
 
-/// Maximum number of runs that judging one section may change: its own and two others.
+/// Maximum number of runs that change when one section is judged: its own run and two others.
 const RUNS_EACH: usize = 3;
-/// Notices per judged section: its own, those of its runs and their alerts, and an alert.
+/// Notices per judged section: one for the section, three per run and its alert, and one for an alert.
 const NOTICES_EACH: usize = 2 + 3 * RUNS_EACH;
 /// Additional notices of alerts per tick.
 const NOTICES_OF_ALERTS: usize = 4 * MOST_LISTED;
@@ -191,7 +192,7 @@ impl App {
     }
 }
 
-/// Numbers the heads in the order of sources. Returns their specifications and modes.
+/// Numbers the heads in the order of sources. Returns each head's specification and modes.
 fn number_heads(
     world: &mut World,
     sensors: &[Entity],
@@ -212,7 +213,7 @@ fn number_heads(
     Ok(specs)
 }
 
-/// Source that supplies the speed of sound.
+/// Depth sensor that supplies the speed of sound.
 fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<SourceId>, PluginError> {
     let Some(id) = &mission.sound_speed_from else { return Ok(None) };
     let place =

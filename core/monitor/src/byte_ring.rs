@@ -1,7 +1,7 @@
-//! Traits of a byte ring: one writer, one reader, each push published whole.
+//! Traits of a byte ring with one writer and one reader. Each push becomes visible as a whole.
 //!
-//! The rings are ringbuf's. The protocols on them use only these traits, so the same code runs on a ring
-//! whose every interleaving can be explored (feature `model`).
+//! The rings are those of the crate ringbuf. The protocols use only these traits. The same code therefore
+//! runs on a ring that explores every interleaving (feature `model`).
 
 use ringbuf::traits::{Consumer, Producer};
 
@@ -10,19 +10,19 @@ pub mod model;
 
 /// Writing end of a ring of bytes. Never blocks.
 pub trait ByteProducer {
-    /// Number of free bytes, at least: the reader may free more meanwhile.
+    /// Number of free bytes. The reader may free more at any time.
     fn vacant(&self) -> usize;
 
     /// Publishes bytes all at once. Bytes that don't fit are left out.
     fn push(&mut self, bytes: &[u8]);
 
-    /// Publishes bytes that aren't contiguous, all at once.
+    /// Publishes bytes that aren't contiguous in memory, all at once.
     fn push_each(&mut self, bytes: impl Iterator<Item = u8>);
 }
 
 /// Reading end of a ring of bytes. Never blocks.
 pub trait ByteConsumer {
-    /// Number of waiting bytes, at least: the writer may add more meanwhile.
+    /// Number of waiting bytes. The writer may add more at any time.
     fn occupied(&self) -> usize;
 
     /// Copies waiting bytes without removing them. Returns their number.

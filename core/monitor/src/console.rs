@@ -1,8 +1,8 @@
 //! The console: a packet source after all sensors, for the operator's input and the program's own reports.
 //!
-//! A packet is one JSON object, a [`Command`]. It passes a ring and the merge like a sensor's bytes and is
-//! recorded as `/raw/console`, so a replay has it at the same place. The console is no sensor: it has no
-//! lamp, no readings, and no part in navigation.
+//! A packet is one JSON object, a [`Command`]. Packets pass a ring and the merge, like a sensor's bytes. They
+//! are recorded as `/raw/console`, so a replay has them at the same place. The console is not a sensor: it
+//! has no lamp, no readings, and no part in navigation.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -26,29 +26,29 @@ pub use text::ShortText;
 pub use headrace_vehicle::CONSOLE_ID;
 /// Maximum number of commands that wait for the loop.
 const MOST_WAITING: usize = 256;
-/// Period of time commands while no sensor delivers data, so that stale data is noticed.
+/// Interval of [`Command::Time`] while no sensor delivers data. The commands let the loop notice stale data.
 const TIME_EVERY: DurNs = DurNs(500_000_000);
 
 /// Reason for refusing a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConsoleError {
-    /// Too many commands wait.
+    /// Too many commands are waiting.
     #[error("sending a command to the loop: {MOST_WAITING} are waiting already; send it again")]
     Full,
-    /// The dive has as many notes as its report holds.
+    /// The dive already has as many notes as its report holds.
     #[error(
         "sending a note to the loop: the dive has {MOST_NOTES} notes, and its report holds no more; further notes are refused"
     )]
     MostNotes,
 }
 
-/// Takes commands from any thread without blocking.
+/// Handle that accepts commands from any thread without blocking.
 #[derive(Clone)]
 pub struct ConsolePort {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     clock: Option<Arc<DiveClock>>,
-    /// Number of notes that all ports have taken.
+    /// Number of notes accepted through all ports.
     notes: Arc<AtomicUsize>,
 }
 
@@ -58,7 +58,8 @@ type DiveClock = dyn Fn() -> MonoNs + Send + Sync;
 impl ConsolePort {
     /// Hands a command to the loop, stamped with the dive's clock. The loop takes it at its next tick.
     ///
-    /// Errors: too many commands wait, or the report has no room for another note. The command was not taken.
+    /// Errors: too many commands are waiting, or the report has no room for another note. The command is
+    /// dropped.
     pub fn send(&self, command: &Command) -> Result<(), ConsoleError> {
         let is_note = matches!(command, Command::Note { .. } | Command::Voice { .. });
         let one_more = |notes| (notes < MOST_NOTES).then_some(notes + 1);
@@ -79,7 +80,7 @@ impl core::fmt::Debug for ConsolePort {
     }
 }
 
-/// The loop's side of [`ConsolePort`]s: moves waiting commands into the source's ring between ticks.
+/// The loop's side of all [`ConsolePort`]s. Between ticks it moves waiting commands into the console's ring.
 pub struct ConsoleInput {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     port: Port,
@@ -87,9 +88,9 @@ pub struct ConsoleInput {
 }
 
 impl ConsoleInput {
-    /// Input of a dive with this clock; `None` if the loop's port has been taken already.
+    /// Console input of a dive with this clock; `None` if the loop's port has been taken already.
     ///
-    /// Without a clock, commands are stamped with the time at which they are taken.
+    /// Without a clock, commands are stamped when they are moved into the ring.
     pub fn new(dive: &mut Loop, clock: Option<Arc<DiveClock>>) -> Option<(Self, ConsolePort)> {
         let port = dive.take_console()?;
         let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
@@ -105,8 +106,8 @@ impl ConsoleInput {
         }
     }
 
-    /// Moves waiting commands in a dive on ports. While no sensor delivers data, it also sends the time to
-    /// the loop.
+    /// Moves waiting commands into the ring of a live dive. While no sensor delivers data, also sends the
+    /// time to the loop.
     pub fn take_in_live(&mut self, dive: &Loop, now: MonoNs) {
         self.take_in(now);
         let Some((_, last)) = dive.tally().span else { return };

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh64::xxh64;
 
-/// Hashes numbers by their bits, little-endian, each seeded with the hash so far.
+/// Hashes numbers by their bits, little-endian. The hash so far seeds each step.
 ///
-/// It is not cryptographic: it detects a dive computed differently, not a forged one.
+/// The digest is not cryptographic. It detects a dive that was computed differently, not a forged dive.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Digest(u64);
 
@@ -22,7 +22,7 @@ impl Digest {
         self
     }
 
-    /// Adds a number bit by bit; -0 counts as +0.
+    /// Adds the bits of a number; -0 counts as +0.
     pub fn number(&mut self, value: f64) -> &mut Self {
         self.integer((value + 0.0).to_bits())
     }

@@ -1,8 +1,8 @@
-//! The dive's entities: the vehicle, and each of its sensors, heads among them.
+//! The dive's entities: the vehicle and its sensors, including the heads.
 //!
 //! The vehicle has [`Navigator`], [`VehicleState`] and its motion statistics. Every sensor has [`Mounted`],
-//! [`SensorDecoder`] and [`SensorHealth`]; a head also has [`Head`], [`HeadSpecification`], [`MeasuredMotion`],
-//! [`LossCount`], [`HeadSweep`], [`HeadFrontier`] and [`HiddenAngles`].
+//! [`SensorDecoder`] and [`SensorHealth`]. A head also has [`Head`], [`HeadSpecification`],
+//! [`MeasuredMotion`], [`LossCount`], [`HeadSweep`], [`HeadFrontier`] and [`HiddenAngles`].
 
 use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
@@ -24,16 +24,16 @@ use headrace_sampling::occlusion::AngleRange;
 use headrace_sensor::device::{Decoder, SensorInfo};
 use headrace_sensor::reading::SourceId;
 
-/// The vehicle's estimator: readings to fixes.
+/// The vehicle's navigation: converts readings to fixes.
 #[derive(Component)]
 pub struct Navigator {
     /// Navigation method.
     pub navigation: Box<dyn Navigation>,
-    /// Next multiple of the advice period; `None` before the first packet.
+    /// Time of the next update, a multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
     /// Detectors of stuck sensors, by source.
     pub repeats: Vec<StuckSensor>,
-    /// Bitmask of the sources that are stuck.
+    /// Bitmask of the stuck sources.
     pub hung: u64,
 }
 
@@ -57,11 +57,11 @@ impl Stateful for Navigator {
 pub struct VehicleState {
     /// Time of the update; `None` before the first.
     pub at: Option<MonoNs>,
-    /// Pose and speed, or the reason for having no fix.
+    /// Pose and speed, or the reason for which there is no fix.
     pub fix: Result<Fix, NoFix>,
     /// Standard deviations of the pose, from its covariance; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
-    /// Doubt about the cable counter while it isn't trusted.
+    /// Doubt about the cable counter; `None` while the counter is trusted.
     pub cable_doubt: Option<CableDoubt>,
 }
 
@@ -121,7 +121,7 @@ impl SensorHealth {
         self.span = Some(widened(self.span, received));
     }
 
-    /// Time for which the sensor has been silent at `now`; `None` if it was never heard.
+    /// Time for which the sensor has been silent at `now`; `None` before its first reading.
     pub fn silent_for(&self, now: MonoNs) -> Option<DurNs> {
         self.span.map(|(_, last)| now.since(last))
     }
@@ -132,7 +132,7 @@ pub(super) fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, Mo
     span.map_or((at, at), |(first, last)| (first.min(at), last.max(at)))
 }
 
-/// A profiling head: its number among the heads, from zero in the order of sources.
+/// A profiling head. Heads are numbered from zero in the order of sources.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub struct Head(pub usize);
 
@@ -141,12 +141,11 @@ pub struct Head(pub usize);
 pub struct HeadSpecification {
     /// Mount and scan parameters.
     pub spec: HeadSpec,
-    /// Modes to which it can be set.
+    /// Modes to which the head can be set.
     pub modes: Vec<HeadMode>,
-    /// Shortest range setting that reaches all wall from the centre, m, and the modes there; `None` if none
-    /// does.
+    /// Shortest range setting that reaches all wall from the centre, m, and the head's modes at that setting.
     ///
-    /// It is the head's own setting or a longer one.
+    /// The setting is the head's own or a longer one. `None` if no setting is long enough.
     pub reaching: Option<(f64, Vec<HeadMode>)>,
 }
 
@@ -155,7 +154,7 @@ pub struct HeadSpecification {
 pub struct HiddenAngles(pub Vec<AngleRange>);
 
 impl HiddenAngles {
-    /// Whether the vehicle occludes the beam at this angle of the head.
+    /// Whether the vehicle occludes the beam at this angle of the head, radians.
     pub fn hides(&self, angle_rad: f64) -> bool {
         self.0.iter().any(|range| range.has(angle_rad))
     }
@@ -166,9 +165,9 @@ impl HiddenAngles {
 pub struct HeadSweep {
     /// Last valid sample in the present sweep.
     pub(super) last: Option<LastSample>,
-    /// Classification of its returns.
+    /// Classification of the head's returns.
     pub(super) wall: HeadWall,
-    /// Its last returns, while they wait for the next ones to decide their classification.
+    /// Returns that wait for the next ones before they are classified.
     pub(super) waiting: WaitingReturns,
 }
 
@@ -176,9 +175,9 @@ pub struct HeadSweep {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Waiting {
     pub(super) ping: PlacedPing,
-    /// The next ping gave no return.
+    /// Whether the next ping gave no return.
     pub(super) broken: bool,
-    /// A new sweep has begun since.
+    /// Whether a new sweep has begun since this return.
     pub(super) new_sweep: bool,
 }
 
@@ -187,7 +186,7 @@ pub(super) struct Waiting {
 pub(super) struct WaitingReturns([Option<Waiting>; MOST_WAITING]);
 
 impl WaitingReturns {
-    /// Adds a return. False if there is no room.
+    /// Adds a return. Returns false if there is no room.
     pub(super) fn add(&mut self, ping: &PlacedPing) -> bool {
         let slot = self.0.iter_mut().find(|slot| slot.is_none());
         slot.map(|slot| *slot = Some(Waiting { ping: *ping, broken: false, new_sweep: false })).is_some()
@@ -210,7 +209,7 @@ pub(super) struct LastSample {
     pub(super) point: Point3<Tunnel>,
     /// Arc length, m.
     pub(super) arc_m: f64,
-    /// Every later ping has been a single step with a return.
+    /// Whether every later ping has been a single step with a return.
     pub(super) unbroken: bool,
 }
 

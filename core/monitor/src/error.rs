@@ -10,7 +10,7 @@ pub enum PluginError {
         /// The id.
         id: String,
     },
-    /// The id is that of the operator's input.
+    /// The id is reserved for the operator's input.
     #[error("adding source {id:?}: that is the id of the operator's input; choose another one")]
     ReservedSource {
         /// The id.

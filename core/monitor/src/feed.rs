@@ -8,12 +8,12 @@ pub trait Feed {
     /// Error that ends the feed.
     type Error;
 
-    /// Waits for the next tick, fills the rings for it, and returns the end of its time; `None` at the end of
-    /// the feed.
+    /// Waits for the next tick and fills the rings for it. Returns the end of the tick's time; `None` at the
+    /// end of the feed.
     ///
-    /// A full ring is drained by [`work_off`].
+    /// If a ring is full, [`work_off`] empties it.
     ///
-    /// Errors: the feed can't continue. Packets fed until then have been processed.
+    /// Errors: the feed can't continue. The loop has processed all packets fed until then.
     fn fill(
         &mut self,
         dive: &mut Loop,
@@ -24,7 +24,7 @@ pub trait Feed {
     fn pause(&mut self);
 }
 
-/// Runs the loop until the feed ends, and calls `after_tick` with it after every tick.
+/// Runs the loop until the feed ends, and calls `after_tick` with the loop after every tick.
 ///
 /// Errors: those of the feed.
 pub fn drive<F: Feed>(
@@ -38,8 +38,9 @@ pub fn drive<F: Feed>(
     Ok(())
 }
 
-/// Ticks at least once, until the rings are empty. A lagging outlet holds packets back, and `pause` gives it
-/// time.
+/// Ticks at least once, until the rings are empty.
+///
+/// A lagging outlet makes the loop hold packets back. `pause` then gives the outlet time.
 pub fn work_off(dive: &mut Loop, now: MonoNs, after_tick: &mut dyn FnMut(&Loop), pause: &mut dyn FnMut()) {
     loop {
         let consumed = dive.tick(now);

@@ -58,13 +58,13 @@ pub(crate) fn pose(x_m: f64) -> Pose {
     Pose { position: Point3::new(x_m, y_m, z_m), attitude: Rot::identity() }
 }
 
-/// A fix there, at 0.1 m/s, with an error of chainage between passes, m.
+/// A fix in the centre of the pipe, at 0.1 m/s, with this chainage error between passes, m.
 pub(crate) fn fix(x_m: f64, pass_error_m: f64) -> Fix {
     let relative = Relative::along(pass_error_m);
     Fix { pose: pose(x_m), speed_mps: 0.1, relative, revisit: relative, tie: 0, settled: 0 }
 }
 
-/// A vehicle without heads there, at 0.1 m/s. Without a chainage it has no pose.
+/// A vehicle without heads, at 0.1 m/s in the centre of the pipe. Without a chainage it has no pose.
 pub(crate) fn situation(x_m: Option<f64>) -> Situation {
     Situation {
         pose: x_m.map(pose),
@@ -79,7 +79,7 @@ pub(crate) fn situation(x_m: Option<f64>) -> Situation {
     }
 }
 
-/// A target of half a metre with two standard deviations, in 100 m.
+/// A target of half a metre with two standard deviations, in a tunnel of 100 m.
 pub(crate) fn task() -> Task {
     Task {
         target_m: 0.5,
@@ -96,7 +96,7 @@ pub(crate) fn advice(of: &Situation) -> Advice {
     Advisor::new(&pipe(), task(), &[], &[]).advise(of, Swing::default(), None)
 }
 
-/// A return at this range and angle from the pipe's floor, from a head in its centre, after a single step.
+/// A return after a single step, from a head in the pipe's centre. The angle counts from the pipe's floor.
 pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     let origin = pose(x_m).position;
     let (sin, cos) = math::sin_cos(angle_rad);
@@ -105,7 +105,7 @@ pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     PlacedPing { outcome: Outcome::Sample { point, arc_m }, ..pinged(x_m, angle_rad) }
 }
 
-/// A ping there without a return within range.
+/// A ping without a return within range, from a head in the pipe's centre.
 pub(crate) fn pinged(x_m: f64, angle_rad: f64) -> PlacedPing {
     PlacedPing {
         head: 0,

@@ -4,25 +4,26 @@ use bevy_ecs::prelude::Resource;
 use headrace_sampling::advice::ModeName;
 use headrace_sampling::head::HeadSet;
 
-/// Names of the heads and their other settings, as the vehicle file has them.
+/// Names of the heads and their alternative settings, as the vehicle file has them.
 #[derive(Debug, Clone, Default, PartialEq, Resource)]
 pub struct HeadDescriptions {
-    /// Ids of the heads' sources, by number of the head.
+    /// Source ids of the heads, by number of the head.
     names: Vec<String>,
     /// Finer mode for all heads, if there is one.
     finer: Option<ModeName>,
-    /// Range setting that reaches all wall from the tunnel's centre, if longer than the present one, m.
+    /// Range setting that reaches all wall from the tunnel's centre, m; `None` if the present setting does.
     longer_m: Option<f64>,
 }
 
 /// A head's name and alternative settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadSettings {
-    /// Id of its source.
+    /// Id of the head's source.
     pub name: String,
     /// Finer mode, if there is one.
     pub finer: Option<ModeName>,
-    /// Range setting that reaches all wall from the tunnel's centre, if longer than its own, m.
+    /// Range setting that reaches all wall from the tunnel's centre, m; `None` if the head's own setting
+    /// does.
     pub longer_m: Option<f64>,
 }
 
@@ -39,7 +40,7 @@ impl HeadDescriptions {
         }
     }
 
-    /// Text for heads that were silent, detected no wall or were distrusted.
+    /// Names of heads that were silent, detected no wall or were distrusted, as text.
     pub(super) fn silent(&self, heads: HeadSet) -> String {
         let names: Vec<&str> =
             heads.iter().map(|head| self.names.get(head).map_or("a head", String::as_str)).collect();
@@ -51,7 +52,7 @@ impl HeadDescriptions {
         }
     }
 
-    /// Name of the finer mode, to follow "in".
+    /// Name of the finer mode, in a form that follows "in".
     pub(super) fn finer_mode(&self) -> String {
         self.finer.map_or_else(|| "a finer mode".to_owned(), |mode| mode.as_str().to_uppercase())
     }
@@ -62,12 +63,12 @@ impl HeadDescriptions {
         format!("{heads} {}", self.finer_mode())
     }
 
-    /// Instruction to set the range that shows more wall, if one is known.
+    /// Instruction to set the range that reaches more wall, if one is known.
     pub(super) fn seeing_more(&self) -> Option<String> {
         self.longer_m.map(|_| format!("set {}", self.longer_range()))
     }
 
-    /// Name of the longer range, to follow a verb or "with".
+    /// Name of the longer range, in a form that follows a verb or "with".
     pub(super) fn longer_range(&self) -> String {
         self.longer_m.map_or_else(|| "a longer range".to_owned(), |range_m| format!("a range of {range_m} m"))
     }
@@ -77,7 +78,7 @@ impl HeadDescriptions {
 pub(crate) mod tests {
     use super::*;
 
-    /// Two heads whose finer mode is FAST, and that reach all wall at 20 m.
+    /// Two heads whose finer mode is FAST, and whose range setting of 20 m reaches all wall.
     pub(crate) fn two() -> HeadDescriptions {
         HeadDescriptions {
             names: vec!["bow".to_owned(), "stern".to_owned()],
@@ -97,9 +98,9 @@ pub(crate) mod tests {
         assert_eq!(text(&[]), "no wall from the heads");
     }
 
-    /// A mode is named if all heads have it, a range if it is enough for all heads.
+    /// A mode is named if all heads have it. A range is named if it is long enough for all heads.
     #[test]
-    fn only_settings_that_help_all_heads_are_named() {
+    fn only_settings_common_to_all_heads_are_named() {
         let head = |finer: &str, longer_m: f64| HeadSettings {
             name: String::new(),
             finer: Some(ModeName::new(finer)),

@@ -1,4 +1,4 @@
-//! Head health: whether a turning head detects the wall at all, judged by its returns.
+//! Head health: whether a turning head detects the wall at all. The returns decide.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,17 +6,17 @@ use headrace_geometry::math::{self, TAU};
 
 /// Angle without a return after which a head is deaf, radians: a whole turn.
 ///
-/// Absorbing walls and side tunnels cover less than that.
+/// Absorbing walls and side tunnels cover less than a turn.
 const DEAF_RAD: f64 = TAU;
-/// Averaging angle for the share of returns that aren't from the wall, radians.
+/// Averaging angle for the share of returns that are off the design, radians.
 const ELSEWHERE_RAD: f64 = TAU / 2.0;
-/// Angle with one range after which a head is stuck at it, radians, and the design's variation needed
-/// meanwhile, m.
+/// A head is stuck if it reports one range over this angle, radians, while the deviation from the design
+/// varies by this much, m.
 const STUCK_RAD: f64 = TAU / 2.0;
 const STUCK_M: f64 = 0.3;
-/// Share of returns off the design above which a head detects no wall, and limit for another head's share.
+/// Share of returns off the design above which a head is deaf, and limit for the share of another head.
 ///
-/// The first applies only while another head's share is below the second.
+/// The first limit applies only if another head's share is below the second.
 const ELSEWHERE: [f64; 2] = [0.85, 0.5];
 
 /// Health of a head; part of the loop's state.
@@ -26,9 +26,9 @@ pub struct HeadHealth {
     last_rad: f64,
     /// Angle turned since the last return, radians.
     unheard_rad: f64,
-    /// Angle with returns, radians, up to a turn.
+    /// Angle turned with returns, radians; at most a turn.
     heard_rad: f64,
-    /// Share of its latest returns that are off the design.
+    /// Share of the latest returns that are off the design.
     elsewhere: f64,
     /// Successive returns of one range.
     same: SameRange,
@@ -38,9 +38,9 @@ pub struct HeadHealth {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct SameRange {
     range_m: f64,
-    /// Angle turned meanwhile, radians.
+    /// Angle turned during these returns, radians.
     turned_rad: f64,
-    /// Least and largest deviation from the design meanwhile, m.
+    /// Least and largest deviation from the design during these returns, m.
     off_m: [f64; 2],
 }
 
@@ -57,7 +57,7 @@ impl SameRange {
         };
     }
 
-    /// Whether half a turn has one range although the wall's distance varies.
+    /// Whether the range is constant over half a turn although the wall's distance varies.
     fn is_stuck(&self) -> bool {
         self.turned_rad >= STUCK_RAD && self.off_m[1] - self.off_m[0] > STUCK_M
     }
@@ -68,9 +68,9 @@ impl SameRange {
 pub struct Heard {
     /// Range that the head reports, m.
     pub range_m: f64,
-    /// Deviation of its place from the design, m.
+    /// Deviation of the return's place from the design, m.
     pub off_m: f64,
-    /// It agrees with the design.
+    /// Whether the return agrees with the design.
     pub is_wall: bool,
 }
 
@@ -86,7 +86,7 @@ impl HeadHealth {
             return;
         };
         if self.hears_nothing() {
-            // The measurement restarts.
+            // After deafness all averages start again.
             *self = Self { last_rad: angle_rad, ..Self::default() };
         }
         self.unheard_rad = 0.0;
@@ -103,10 +103,10 @@ impl HeadHealth {
 
     /// Whether the head detects no wall at all.
     ///
-    /// It is deaf if a whole turn gave no return, or half a turn gave one range although the wall's distance
-    /// varies. It is also deaf if nearly all its returns are off the design while another head detects the
-    /// wall, by their [`HeadHealth::elsewhere`]. If all heads see something else, the position or the design is
-    /// wrong.
+    /// The head is deaf in three cases. A whole turn gave no return. Half a turn gave one range although the
+    /// wall's distance varies. Nearly all returns are off the design while another head detects the wall:
+    /// `others` has the other heads' [`HeadHealth::elsewhere`]. If all heads see something else, the position
+    /// or the design is wrong, and no head is deaf for that.
     pub fn is_deaf(&self, mut others: impl Iterator<Item = f64>) -> bool {
         let [most, least] = ELSEWHERE;
         self.hears_nothing()
@@ -114,9 +114,9 @@ impl HeadHealth {
             || self.elsewhere > most && others.any(|elsewhere| elsewhere < least)
     }
 
-    /// Share of its latest returns that are off the design, from 0 to 1.
+    /// Share of the head's latest returns that are off the design, from 0 to 1.
     ///
-    /// It is 1 before a whole turn with returns, and after a whole turn without any.
+    /// The share is 1 until a whole turn gave returns, and again after a whole turn without any.
     pub fn elsewhere(&self) -> f64 {
         let is_known = self.heard_rad >= TAU && !self.hears_nothing();
         if is_known { self.elsewhere } else { 1.0 }
@@ -129,7 +129,7 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
-    /// A head that turns for this many pings and detects the wall, something else, or nothing.
+    /// Health of a head after this many pings, each of which detects the wall, something else, or nothing.
     fn hearing(pings: u32, is_wall: impl Fn(u32) -> Option<bool>) -> HeadHealth {
         let mut hearing = HeadHealth::default();
         for ping in 0..pings {
@@ -145,10 +145,10 @@ mod tests {
         let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
         assert!(!from_500(890).is_deaf(std::iter::empty()));
         assert!(from_500(901).is_deaf(std::iter::empty()));
-        // A single return ends it.
+        // A single return ends deafness.
         let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
         assert!(!heard_again.is_deaf(std::iter::empty()));
-        // If three quarters of each turn give no return, that is a side tunnel or an absorbing wall.
+        // Three quarters of each turn give no return, as beside a side tunnel or an absorbing wall.
         let side = hearing(4000, |ping| (ping % 400 < 100).then_some(true));
         assert!(!side.is_deaf(std::iter::empty()));
     }
@@ -166,7 +166,7 @@ mod tests {
         assert!(!hears.is_deaf([hears.elsewhere()].into_iter()));
         let begins = hearing(100, |_| Some(true));
         assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "the other head isn't known yet");
-        // A rock and a niche of a third of the turn.
+        // A rock or a niche over a third of the turn.
         let rock = hearing(4000, |ping| Some(ping % 400 >= 130));
         assert!(!rock.is_deaf([hears.elsewhere()].into_iter()));
     }
@@ -183,7 +183,7 @@ mod tests {
             hearing.is_deaf(std::iter::empty())
         };
         assert!(stuck(202, 0.4) && !stuck(199, 0.4));
-        // In the centre of a round pipe, and nearly there.
+        // The wall's distance varies by less than the limit: in the centre of a round pipe, and near it.
         assert!(!stuck(4000, 0.0) && !stuck(4000, 0.2));
     }
 }

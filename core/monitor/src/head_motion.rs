@@ -6,32 +6,33 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Angles closer together than this are equal, radians. It is well below the finest head's step (0.3
-/// degrees).
+/// Maximum difference between equal angles, radians. The finest step of any head, 0.3 degrees, is much
+/// larger.
 const SAME_ANGLE_RAD: f64 = 1e-6;
-/// Minimum angle over which the turn rate is measured, radians, once the head has turned that far.
+/// Minimum angle over which the turn rate is measured, radians. Until the head has turned that far, the whole
+/// angle so far is used.
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
-/// Ratio to the usual step above which a step isn't a single one: pings were skipped.
+/// Multiple of the usual step above which a step counts as several: pings were skipped.
 const LONG_STEP: f64 = 1.5;
 
-/// Multiple of the usual step, and of the angle at its turn rate, beyond which a head has restarted
+/// Multiples of the usual step, and of the angle expected at the turn rate, beyond which a head has restarted
 /// elsewhere.
 ///
-/// A head that catches up with its program takes steps of at most eight times its own.
+/// A head that has fallen behind its programmed angle takes steps of at most eight times its own.
 const ELSEWHERE_STEPS: f64 = 10.0;
 const ELSEWHERE_RATES: f64 = 4.0;
 
-/// Stall or silence after which the measurement of the turn rate restarts.
+/// Duration of a stall or silence after which the measurement of the turn rate restarts.
 const STANDING: DurNs = DurNs(1_000_000_000);
 
-/// Classification of a ping within the head's motion.
+/// Classification of a ping by the head's motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turned {
-    /// The head has moved a single step since the previous ping.
+    /// Whether the head has moved a single step since the previous ping.
     pub single_step: bool,
-    /// The head has reversed, or its motion is unknown: a new sweep begins.
+    /// Whether a new sweep begins: the head has reversed, or its motion is unknown.
     pub new_sweep: bool,
-    /// The head is stalled: at the same angle for longer than any normal ping interval.
+    /// Whether the head is stalled: at the same angle for longer than any normal ping interval.
     pub standing: bool,
 }
 
@@ -47,7 +48,7 @@ pub struct MeasuredMotion {
     sector_rad: Option<f64>,
     /// Whether the present sweep began at a turning point.
     from_turning_point: bool,
-    /// Total unsigned angle turned through, radians, and the anchors from which the rate is measured.
+    /// Total unsigned angle turned through, radians, and the two points from which the rate is measured.
     turned_rad: f64,
     anchors: [Option<(MonoNs, f64)>; 2],
     step_rad: Option<f64>,
@@ -74,8 +75,8 @@ impl MeasuredMotion {
         (enough && span_s > 0.0).then(|| turned / span_s * self.last_step_rad.signum())
     }
 
-    /// Size of the sector, radians, once the head has reversed twice; `None` again once it turns beyond a
-    /// full circle.
+    /// Size of the sector, radians, once the head has reversed twice; `None` after the head has turned a full
+    /// circle.
     pub fn sector_rad(&self) -> Option<f64> {
         self.sector_rad
     }
@@ -95,7 +96,7 @@ impl MeasuredMotion {
             return Turned { single_step: false, new_sweep: false, standing };
         }
         if self.is_elsewhere(at.since(last), size) {
-            // The head didn't turn through the angle between, and its direction is unknown.
+            // The head's motion between the two angles, and its direction, are unknown.
             self.last = Some((at, angle_rad));
             self.anchors = [Some((at, self.turned_rad)), None];
             (self.last_step_rad, self.since_turning_rad, self.from_turning_point) = (0.0, 0.0, false);
@@ -127,7 +128,9 @@ impl MeasuredMotion {
         Turned { single_step, new_sweep: reversed, standing: false }
     }
 
-    /// Whether the head may have restarted at a distant angle. A stalled head resumes with a step.
+    /// Whether the head may have restarted at a distant angle.
+    ///
+    /// A head that resumes after a stall moves a normal step.
     fn is_elsewhere(&self, silence: DurNs, size_rad: f64) -> bool {
         let by_far = self.step_rad.zip(self.rate_radps()).is_some_and(|(step_rad, rate_radps)| {
             let turned_rad = (rate_radps * silence.as_secs_f64()).abs();
@@ -143,8 +146,8 @@ impl MeasuredMotion {
         ping_period_s.map_or(STANDING.as_secs_f64(), |period_s| 4.0 * period_s)
     }
 
-    /// Keeps two anchors half a turn apart, so that the older one is always between half a turn and a whole
-    /// turn back.
+    /// Keeps two anchors half a turn apart. The older one thus lies between half a turn and a whole turn
+    /// back.
     fn move_anchors(&mut self, at: MonoNs) {
         match self.anchors {
             [Some((_, older)), None] if self.turned_rad - older >= RATE_SPAN_RAD => {
@@ -209,15 +212,16 @@ mod tests {
     }
 
     #[test]
-    fn step_over_missing_pings_is_not_single() {
+    fn step_across_missing_pings_is_not_a_single_step() {
         let (track, turned) = run([0.0, 0.9, 1.8, 2.7, 4.5, 5.4].into_iter());
         assert!(!turned[4].single_step && turned[5].single_step);
         assert!((track.step_rad().unwrap() - f64::to_radians(0.9)).abs() < 1e-9);
     }
 
-    /// A restart or a turn by hand invalidates earlier pings, and the angle between doesn't count as turned.
+    /// After a restart, or after somebody has turned the head by hand, earlier pings are no longer used. The
+    /// angle between the two places doesn't count as turned.
     #[test]
-    fn head_restarted_elsewhere_adds_no_turned_angle() {
+    fn restart_at_a_distant_angle_adds_no_turned_angle() {
         for gap_ms in [20, 60, 1500, 60_000] {
             for jump_deg in [-170, -60, -20, 20, 60, 170] {
                 for way in [0.9, -0.9] {

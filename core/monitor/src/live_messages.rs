@@ -1,8 +1,7 @@
-//! Live messages about a dive: each situation once, neighbours as one stretch, and its end once that is
-//! known.
+//! Live messages about a dive. Each situation is reported once, neighbouring sections as one stretch.
 //!
-//! The terminal's lines and those of `--json-lines` are made from them. Allocates: for outlets, not for a
-//! tick.
+//! The end of a stretch is reported once it is known. The terminal and `--json-lines` print these messages.
+//! Allocates: outlets only, never within a tick.
 
 use serde::Serialize;
 
@@ -21,29 +20,29 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Interval of the messages on coverage extent and metres by verdict, in data time.
 const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 
-/// Length of a run with an unreported cause from which that cause is reported, m.
+/// Minimum length of a run with an unreported cause before that cause is reported, m.
 const LASTS_M: f64 = 1.0;
 
 /// A live message. The field names are the contract of `--json-lines`. Lengths are in m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum LiveMessage {
-    /// Sections were missed. It is repeated if a run continues for another cause, from where that cause
-    /// begins.
+    /// Sections were missed. If a run continues with another cause, the message is repeated from the first
+    /// section with that cause.
     Flag {
         /// Number of the run.
         run: u32,
-        /// Beginning.
+        /// Beginning of the stretch with this cause, m.
         from_m: f64,
         /// Main cause.
         cause: Cause,
         /// All causes.
         causes: Causes,
-        /// Figures for its text.
+        /// Figures for the text of the message.
         #[serde(skip)]
         missed: Missed,
     },
-    /// Ends of the last flagged run.
+    /// End of the last flagged run is known.
     FlagEnds {
         /// Number of the run.
         run: u32,
@@ -51,10 +50,10 @@ pub enum LiveMessage {
         from_m: f64,
         /// End.
         to_m: f64,
-        /// Metres of it that fail.
+        /// Metres of the run that fail.
         failed_m: f64,
     },
-    /// A missed stretch was passed again, and none of it fails any more.
+    /// A missed stretch was passed again, and none of its sections fails any more.
     Cleared {
         /// Number of the run that was flagged.
         run: u32,
@@ -65,18 +64,18 @@ pub enum LiveMessage {
     },
     /// A stretch without a verdict has begun.
     CannotSay(UnsureStretch),
-    /// Ends of a stretch without a verdict.
+    /// End of a stretch without a verdict is known.
     CannotSayEnds(UnsureStretch),
-    /// Not all heads have passed the place where the vehicle began or turned back, and the vehicle is well
-    /// beyond it.
+    /// Not all heads have passed the place where the vehicle began or turned back, and the vehicle is now
+    /// well away from it.
     NotInspected(UnsureStretch),
     /// An alert about the dive as a whole.
     Alert {
         /// Kind.
         kind: &'static str,
-        /// Distrusted head.
+        /// Id of the distrusted head.
         head: Option<String>,
-        /// Place.
+        /// Chainage, m.
         x_m: f64,
         /// Text.
         text: String,
@@ -106,20 +105,20 @@ pub enum LiveMessage {
 pub struct LiveMessages {
     /// Last flagged run with its reported causes, until its end is reported.
     run: Option<(RunId, Causes)>,
-    /// Stretches reported as missed, until none of them fails any more.
+    /// Stretches reported as missed, as long as any of their sections fails.
     missed: Vec<ReportedMiss>,
     /// Last reported unsure stretch, until its end is reported.
     unsure: Option<Stretch>,
-    /// It was reported as one in which the error matters most.
+    /// Whether that stretch was reported as one in which the error matters more than the hole.
     told_as_error: bool,
-    /// Stretches with reported ends.
+    /// Stretches whose ends were reported.
     told: Vec<Stretch>,
-    /// Sections at an end of the coverage extent, until the vehicle is well beyond.
+    /// Sections at an end of the coverage extent, kept until the vehicle is well away from them.
     at_ends: Option<Stretch>,
     way_told: Option<MonoNs>,
 }
 
-/// Sections reported as missed, from the first to before the last that ever failed.
+/// Sections reported as missed: from the first one that ever failed to the one after the last.
 #[derive(Debug, Clone, Copy)]
 struct ReportedMiss {
     run: RunId,
@@ -171,11 +170,11 @@ impl LiveMessages {
         }
     }
 
-    /// Reports what is due by the live state, after every tick.
+    /// Reports whatever the live state requires, after every tick.
     pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(at) = state.at else { return };
         let sections = &dive.coverage().sections;
-        // Counted from the first update, when there is nothing to report.
+        // The interval begins at the first update, when there is nothing to report.
         let since = *self.way_told.get_or_insert(at);
         if at.since(since).0.abs() >= WAY_EVERY.0 && state.metres.way_m() > 0.0 {
             self.way_told = Some(at);
@@ -216,7 +215,7 @@ impl LiveMessages {
 
     fn note_unsure(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let section_m = sections.section_m();
-        // A section at an end of the extent is reported later, if it remains unsure.
+        // A section at an end of the coverage extent is reported later, if it is still unsure then.
         let is_settled = sections.get(section).is_some_and(|section| section.settled);
         let lasts = |here: &Stretch| is_settled || here.why == Unsure::NotInspected;
         let Some(here) = sections.unsure(section).filter(lasts) else {
@@ -228,8 +227,8 @@ impl LiveMessages {
             return;
         };
         let is_told = |told: &Stretch| told.why == here.why && (told.from..told.to).contains(&section);
-        // The pilot is on the way back to a missed stretch, so an intermediate result of half a pass is not
-        // reported.
+        // The pilot is passing a missed stretch again. Half a pass gives only an intermediate result, which
+        // is not reported.
         let is_missed =
             |told: &ReportedMiss| here.why != Unsure::NotInspected && (told.from..told.to).contains(&section);
         if self.told.iter().any(is_told) || self.missed.iter().any(is_missed) {
@@ -245,7 +244,7 @@ impl LiveMessages {
         if let Some(last) = &mut self.unsure
             && (is_told(last) || last.join(&here, section_m))
         {
-            // The reason of the first sections may differ from that of most.
+            // The first sections of a stretch may have a different reason than most of its sections.
             if self.told_as_error && !last.is_mostly_error() {
                 self.told_as_error = false;
                 tell(LiveMessage::CannotSay(UnsureStretch::of(last, sections)));
@@ -264,7 +263,7 @@ impl LiveMessages {
         }
     }
 
-    /// Reports the end of the last flagged run once a section beyond it doesn't fail.
+    /// Reports the end of the last flagged run once a section beyond the run has a verdict other than fail.
     fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         // An open section may still join the run.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
@@ -323,7 +322,7 @@ impl LiveMessages {
         self.missed.push(whole);
     }
 
-    /// Reports the end of a missed stretch with its reported ends, and then its parts without a verdict.
+    /// Reports the end of a missed stretch as it was reported, and then its parts without a verdict.
     fn clear(&mut self, run: &Run, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(at) = self.missed.iter().position(|told| told.meets(run)) else { return };
         let Some(told) = self.missed.get(at).copied() else { return };
@@ -339,9 +338,9 @@ impl LiveMessages {
         self.close_unsure(sections, tell);
     }
 
-    /// Reports a run again once a metre of it fails for an unreported cause.
+    /// Reports a run again if at least a metre of it fails for a cause that was not reported yet.
     ///
-    /// Following the earlier advice may still miss that wall.
+    /// A pilot who follows only the earlier advice may miss that wall again.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let sections = &dive.coverage().sections;
         let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };
@@ -359,8 +358,9 @@ impl LiveMessages {
     }
 }
 
-/// A stretch by the present state of its sections, with its reported ends; as reported if none is unsure any
-/// more.
+/// The stretch with the present state of its sections, but with the ends that were reported.
+///
+/// If no section is unsure any more, returns the stretch as it was reported.
 fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     let each = (told.from..told.to).filter_map(|index| sections.unsure(index));
     let mut each = each.filter(|here| here.why == told.why);
@@ -375,7 +375,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     now
 }
 
-/// Message for a run from one of its sections on.
+/// Message for a run, beginning at one of its sections.
 fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> LiveMessage {
     let sections = &dive.coverage().sections;
     let from_m = sections.bounds_m(section).0;

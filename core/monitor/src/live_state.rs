@@ -1,10 +1,10 @@
 //! The live state: the present state of the dive, as one structure by value. `docs/reference/live-state.md`
 //! describes it.
 //!
-//! It is made at every update and published with every tick. The terminal and the lines of `--json-lines`
-//! show it. All fields are as of the last update, in data time, and so the same in a replay. Only
-//! [`LiveState::now`] belongs to the tick. A loop whose ports are silent keeps ticking, and ages are taken
-//! against `now`.
+//! Every update makes a live state, and every tick publishes the latest one. The terminal and the lines of
+//! `--json-lines` show it. All fields except [`LiveState::now`] are as of the last update, in data time, and
+//! so the same in a replay. [`LiveState::now`] belongs to the tick: a loop without data keeps ticking, and
+//! ages are measured up to `now`.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -28,27 +28,28 @@ pub use condition::{Condition, Lamp};
 
 /// Version of the live state and of its JSON.
 pub const LIVE_STATE_VERSION: u32 = 1;
-/// Age above which data is shown as stale. It equals the time for which a head may be silent.
+/// Age above which data is shown as stale. It equals the maximum time between readings of a head that isn't
+/// silent.
 pub const OLD_AFTER: DurNs = DurNs(2_000_000_000);
 
-/// Reason for which an existing position is doubtful.
+/// Reason for which a position is doubtful.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionDoubt {
     /// The cable counter isn't trusted.
     Cable,
-    /// The error between passes is larger than the advice allows for.
+    /// The position error between passes is larger than the advice allows for.
     Spread,
 }
 
 /// Availability of a position.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum PositionState {
-    /// No position, for this reason.
+    /// There is no position, for this reason.
     None(NoFix),
-    /// A position that makes samples placed by it doubtful.
+    /// There is a position, but it makes the samples placed by it doubtful, for this reason.
     Doubtful(PositionDoubt),
-    /// A valid position.
+    /// The position is reliable.
     Ok,
 }
 
@@ -101,9 +102,9 @@ pub struct ActiveAlert {
     pub kind: AlertKind,
     /// The distrusted head.
     pub source: Option<SourceId>,
-    /// Time at which its present occurrence began.
+    /// Time at which the alert's present occurrence began.
     pub since: MonoNs,
-    /// Chainage of its first occurrence, m.
+    /// Chainage of the alert's first occurrence, m.
     pub x_m: f64,
     /// Largest deviation, m.
     pub worst_m: f64,
@@ -112,7 +113,7 @@ pub struct ActiveAlert {
 /// All alerts that hold now.
 pub type ActiveAlerts = [Option<ActiveAlert>; MOST_ALERTS];
 
-/// Slowest practical speed, m/s: a smaller limit counts as none.
+/// Slowest practical speed, m/s. A lower advised speed counts as no speed.
 pub const LEAST_MPS: f64 = 0.005;
 
 /// State of a sensor.
@@ -127,7 +128,7 @@ pub enum SensorState {
     Stalled,
     /// A head that turns and pings without detecting the wall.
     Deaf,
-    /// It repeats its last reading.
+    /// The sensor repeats its last reading.
     Hung,
     /// A head that is distrusted.
     Distrusted,
@@ -135,12 +136,12 @@ pub enum SensorState {
     Ok,
 }
 
-/// The live state. Speeds m/s, lengths m.
+/// The live state. Speeds are in m/s, lengths in m.
 #[derive(Debug, Clone, Copy, PartialEq, Resource)]
 pub struct LiveState {
-    /// End of the tick that published it. Ages are taken against this.
+    /// End of the tick that published the state. Ages are measured up to this time.
     pub now: MonoNs,
-    /// Time of the update that made it; `None` before the first.
+    /// Time of the update that made the state; `None` before the first update.
     pub at: Option<MonoNs>,
     /// Availability of a position.
     pub position: PositionState,
@@ -148,11 +149,11 @@ pub struct LiveState {
     pub chainage_m: Option<f64>,
     /// Standard deviations of the pose; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
-    /// Standard deviation of one pass against the next.
+    /// Standard deviation of the position of one pass relative to the next.
     pub pass_sd_m: f64,
-    /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if unneeded.
+    /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if that isn't needed.
     ///
-    /// The heading follows soon afterwards.
+    /// Soon after this time the heading is known.
     pub stand_s: u32,
     /// Speed along the tunnel, positive inwards; `None` without a position.
     pub speed_mps: Option<f64>,
@@ -160,7 +161,7 @@ pub struct LiveState {
     pub advice: Option<Advice>,
     /// Target T.
     pub target_m: f64,
-    /// Confidence: standard deviations of a hole by which a pass must clear the target.
+    /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
     pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
@@ -170,9 +171,9 @@ pub struct LiveState {
     pub metres: LiveMetres,
     /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
-    /// All wall that heads see here has passed: it follows from chainage and verdicts.
+    /// Whether all wall that the heads see here has passed, by chainage and verdicts.
     pub passed: bool,
-    /// Place to go back to for a missed stretch, m, while the vehicle is on its way there.
+    /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
     pub back_to_m: Option<f64>,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
@@ -197,7 +198,7 @@ stateful!(LiveState {
 });
 
 impl LiveState {
-    /// State before the first update, in a tunnel of any length.
+    /// State before the first update, in a tunnel of unlimited length.
     pub(super) fn new(target_m: f64, confidence_sd: f64, heads: u64, sources: u16) -> Self {
         Self {
             now: MonoNs(0),
@@ -227,7 +228,7 @@ impl LiveState {
         }
     }
 
-    /// End of the tunnel that all heads are beyond, m; `None` if a head may be inside.
+    /// End of the tunnel beyond which all heads are, m; `None` if a head may be inside.
     pub fn outside_m(&self) -> Option<f64> {
         let x_m = self.chainage_m?;
         let beyond = x_m > self.length_m + self.heads_reach_m;
@@ -235,7 +236,7 @@ impl LiveState {
         if beyond { Some(self.length_m) } else { before.then_some(0.0) }
     }
 
-    /// Whether the pilot is advised to stand still, for the gyros' bias, instead of a speed.
+    /// Whether the pilot is advised to stay stationary for the gyros' bias, rather than to keep a speed.
     pub fn asks_to_stand(&self) -> bool {
         self.condition() == Condition::CannotSay(PositionDoubt::Spread) && self.stand_s > 0
     }
@@ -245,7 +246,7 @@ impl LiveState {
         self.at.map(|at| DurNs(self.now.since(at).0.max(0)))
     }
 
-    /// Whether it is shown as stale.
+    /// Whether the state is shown as stale.
     pub fn is_old(&self) -> bool {
         self.age().is_some_and(|age| age.0 > OLD_AFTER.0)
     }
@@ -296,9 +297,9 @@ impl LiveState {
         Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps >= LEAST_MPS)
     }
 
-    /// Share of lost returns if compensating for them costs at least a fifth of the speed, otherwise `None`.
+    /// Share of lost returns; `None` unless compensating for the losses costs at least a fifth of the speed.
     pub fn lost_share(&self) -> Option<f64> {
-        /// Share of the speed that remains.
+        /// Share of the speed that remains after a loss of a fifth.
         const LEFT: f64 = 0.8;
         let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
         let margins = advice.margins?;
@@ -311,7 +312,7 @@ impl LiveState {
     }
 }
 
-/// Bitmask of the sources of the heads in a set, which are given by number.
+/// Bitmask of the sources of the heads in a set. The set has the heads by number.
 pub(super) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
     let numbered = sources.enumerate().filter(|(head, _)| of.has(*head));
     numbered.fold(0, |bits, (_, source)| bits | 1 << u64::from(source.0 % 64))

@@ -1,4 +1,4 @@
-//! Live texts: place first, then problem, then action. Terminals break them to their width.
+//! Live texts: first the place, then the problem, then the action. Terminals break the texts to their width.
 
 use super::alert_list::{AlertChange, ListedAlertJson};
 use super::head_descriptions::HeadDescriptions;
@@ -14,11 +14,11 @@ use headrace_geometry::tunnel::Profile;
 /// A line for the pilot.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PilotLine {
-    /// Place: one stationing, or two.
+    /// Place: one stationing, or two for a stretch.
     pub place: String,
     /// Speed; empty if it isn't shown.
     pub speed: String,
-    /// Problem, most important part first. A narrow screen leaves the last parts out.
+    /// Parts of the problem, most important part first. A narrow screen leaves out the last parts.
     pub what: Vec<String>,
     /// Action to take; empty if there is none.
     pub action: String,
@@ -42,7 +42,8 @@ impl PilotLine {
         text
     }
 
-    /// The line broken to at most `columns`. Continuation lines are indented below the first one's text.
+    /// The line broken to at most `columns`. Continuation lines are indented to where the text of the first
+    /// line begins.
     pub fn broken(&self, columns: usize) -> Vec<String> {
         let whole = self.text();
         if whole.chars().count() <= columns {
@@ -68,8 +69,8 @@ impl PilotLine {
 
     /// As much of a status as fits into `columns`.
     ///
-    /// It leaves out the last parts first, then the speed, then the reason if there is an action. The rest is
-    /// cut off.
+    /// The last parts are left out first, then the speed, then the reason if there is an action. A line that
+    /// is still too long is cut off.
     pub fn cut(&self, columns: usize) -> String {
         let mut line = self.clone();
         let is_wide = |line: &Self| line.text().chars().count() > columns;
@@ -92,8 +93,8 @@ impl PilotLine {
     }
 }
 
-/// Status line: place, speed, condition and action, then the turn's forecast, silent sensors, and failed
-/// metres.
+/// Status line: place, speed, condition and action. The turn's forecast, silent sensors and failed metres
+/// follow.
 ///
 /// `name` returns a source's id.
 pub fn status_line(
@@ -104,7 +105,7 @@ pub fn status_line(
 ) -> PilotLine {
     let condition = state.condition();
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
-    // A speed within the measurement error of the limit is called ok although it is slightly over.
+    // Slightly over the limit, within the measurement error, the condition is `Good`.
     let is_over = matches!(condition, Condition::TooFast | Condition::Over | Condition::TurnUnsure);
     let decimals = if is_over { speed_decimals(state.speed_mps, state.v_max_mps()) } else { 2 };
     let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.decimals$} m/s"));
@@ -132,14 +133,14 @@ pub fn status_line(
     };
     let is_old = matches!(condition, Condition::Old(_) | Condition::NoData);
     let speed = match state.speed_mps {
-        // A zero gets no minus sign.
+        // A speed of zero gets no minus sign.
         Some(speed_mps) if !is_old => {
             format!("{:.decimals$} m/s", if speed_mps.abs() < 0.005 { 0.0 } else { speed_mps })
         }
         _ => String::new(),
     };
     let mut parts = vec![what];
-    // Losses come before possible losses: a narrow screen leaves the last parts out.
+    // Failed metres come first, since a narrow screen leaves out the last parts.
     if state.metres.fail_m > 0.0 {
         parts.push(format!("missed {:.2} m", state.metres.fail_m));
     }
@@ -163,9 +164,9 @@ pub fn status_line(
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
 }
 
-/// Number of decimals at which the present speed and the limit differ.
+/// Number of decimals with which the present speed and the limit read differently.
 ///
-/// A speed isn't too fast if both read the same.
+/// A speed that reads like the limit would not seem too fast.
 fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
     let hundredths = |mps: f64| (mps * 100.0).round();
     let is_over = |(speed_mps, v_max_mps): (f64, f64)| {
@@ -210,12 +211,13 @@ fn doubt_text(doubt: PositionDoubt, state: &LiveState) -> String {
     }
 }
 
-/// Share of lost returns if it limits the speed. The forecast of a turn without losses means little then.
+/// Share of lost returns, if it limits the speed. In that case the turn's forecast, which assumes no losses,
+/// means little.
 fn losses_text(state: &LiveState) -> Option<String> {
     state.lost_share().map(|share| format!("{:.0} % of returns lost", 100.0 * share))
 }
 
-/// Forecast T of the present turn, against the target.
+/// Forecast T of the present turn, and the target.
 fn forecast_text(state: &LiveState) -> Option<String> {
     let advice = state.advice.as_ref().filter(|_| state.v_max_mps().is_some())?;
     Some(match advice.predicted_t_m {
@@ -224,7 +226,7 @@ fn forecast_text(state: &LiveState) -> Option<String> {
     })
 }
 
-/// Metres of the coverage extent by verdict, without those that are zero.
+/// Metres of the coverage extent by verdict, without zeros.
 pub fn metres_text(metres: &LiveMetres) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let all = [
@@ -239,7 +241,7 @@ pub fn metres_text(metres: &LiveMetres) -> String {
     core::iter::once(passed).chain(parts).collect::<Vec<_>>().join(", ")
 }
 
-/// Length of a part of a stretch, m; empty if it is the whole stretch or nothing.
+/// Length of a part of a stretch, m, as text. The text is empty if the part is empty or the whole stretch.
 pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
     if part_m <= 0.0 || part_m > whole_m - 1e-6 { String::new() } else { format!(", {part_m:.2} m of it") }
 }
@@ -325,9 +327,10 @@ fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
 }
 
 impl LiveMessage {
-    /// Whether its line adds something to the status and the other lines.
+    /// Whether the message's line adds something to the status and the other lines.
     ///
-    /// Lines for alerts show an acknowledgement, an end that no other line shows, and remaining resources.
+    /// Of the changes of alerts, these add something: acknowledgements, remaining resources, and ends that no
+    /// other line shows.
     pub fn adds_line(&self) -> bool {
         let Self::AlertChange { change, alert } = self else { return true };
         let is_left = matches!(alert.kind, "cable_left" | "time_left" | "battery_left");
@@ -342,7 +345,8 @@ impl LiveMessage {
             AlertChange::Acknowledged => true,
             AlertChange::Raised => is_left || is_sensor,
             AlertChange::Changed => is_left,
-            // The end of an unacknowledged alert is shown when it comes, not when it is acknowledged.
+            // If nobody has acknowledged the alert, the line appears when the condition ends, not at the
+            // acknowledgement.
             AlertChange::Rectified => is_told_once,
             AlertChange::Cleared => is_told_once && alert.rectified_s == alert.cleared_s,
             AlertChange::Silenced => false,

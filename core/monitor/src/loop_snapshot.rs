@@ -20,7 +20,7 @@ use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntiti
 use super::stages::{Advisor, Driving, SoundSpeed};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
-/// A part of the state: name, resource or component type, and functions to save and restore it.
+/// A part of the state: name, type of the resource or component, and functions to save and restore it.
 struct Part {
     kind: TypeId,
     name: &'static str,
@@ -70,7 +70,7 @@ impl StateParts {
         self.add::<T>(name);
     }
 
-    /// Adds a resource, unless it was added already.
+    /// Adds a resource. A resource that was added already is left out.
     fn add<T: Resource<Mutability = Mutable> + Stateful>(&mut self, name: &'static str) {
         self.add_part(Part {
             kind: TypeId::of::<T>(),
@@ -147,7 +147,7 @@ mod tests {
     use headrace_vehicle::Mission;
     use serde::{Deserialize, Serialize};
 
-    /// A decoder without readings.
+    /// A decoder that never gives a reading.
     #[derive(Serialize, Deserialize)]
     struct Silent;
 
@@ -161,9 +161,9 @@ mod tests {
 
     /// Every resource or component must be listed.
     ///
-    /// It is either a part of the state, or made at arming and constant or reset every tick.
+    /// It is either a part of the state, or it is constant since arming or reset every tick.
     #[test]
-    fn every_resource_and_component_is_saved_or_listed_as_no_state() {
+    fn every_resource_and_component_is_saved_or_listed_as_stateless() {
         let profile = shapes::circle(3.0).unwrap();
         let navigation = DirectNavigation::new(profile.clone(), Site::default());
         let mut app = App::new(Mission::new(profile, 1.0));

@@ -1,4 +1,4 @@
-//! Returns that a head loses by chance, counted while it turns.
+//! Counts the returns that a head loses by chance while it turns.
 
 use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
@@ -7,20 +7,20 @@ use super::head_health::{HeadHealth, Heard};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::losses::LossRate;
 
-/// Number of angle bins: finer than the steps of heads.
+/// Number of angle bins. A bin is finer than the step of any head.
 const BINS: usize = 2048;
 const WORDS: usize = BINS / 64;
 /// Number of pings at which the counts are halved.
 const WINDOW: u32 = 4096;
-/// Minimum number of pings for a share: one loss at the beginning isn't a share.
+/// Minimum number of pings for a share. With fewer, a single loss would count too much.
 const LEAST: u32 = 100;
-/// Weight, in pings, of the overall share in that after a lost ping, while those are few.
+/// Weight of the overall share in the share after a lost ping, in pings. It matters while lost pings are few.
 const USUAL: f64 = 50.0;
-/// Share of lost pings above which a head is nearly deaf: hardly an angle gives a return in both of two
-/// turns.
+/// Share of lost pings above which a head is nearly deaf. Hardly any angle then gives a return in two
+/// successive turns.
 const NEARLY_ALL: f64 = 0.75;
 
-/// Number of pings, and of lost ones.
+/// Number of pings, and how many of them were lost.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Count {
     all: u32,
@@ -60,29 +60,29 @@ impl Angles {
 
 /// Losses of one head; part of the loop's state.
 ///
-/// It counts pings at angles at which the head detected the wall a turn before and a turn after. Wall that is
-/// silent turn after turn, such as a side tunnel or wall met too flatly, isn't lost by chance, neither at its
-/// beginning nor at its end.
+/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. Some
+/// wall is silent turn after turn, such as a side tunnel or wall at a grazing angle. Its returns are not lost
+/// by chance, neither at its beginning nor at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
-    /// Whether the wall was detected at each angle a turn ago, and in the turn before.
+    /// Whether the wall was detected at each angle in the last turn, and in the turn before that.
     heard: Angles,
     heard_before: Angles,
-    /// The ping before the one a turn ago was lost.
+    /// Whether the ping before the last one at each angle was lost.
     followed_lost: Angles,
-    /// Counts of all pings at wall within range, and of the counted ones; each in total and after a lost
-    /// ping.
+    /// Counts of all pings at wall within range, of the counted pings, and of the counted pings that followed
+    /// a lost ping.
     any: Count,
     by_chance: Count,
     after_lost: Count,
-    /// The last ping was lost.
+    /// Whether the last ping was lost.
     was_lost: bool,
     /// Health of the head.
     hearing: HeadHealth,
 }
 
 impl LossCount {
-    /// Counts a ping at wall within range.
+    /// Counts a ping at wall within range, in the bin of its angle.
     ///
     /// Allocates: never.
     pub fn ping(&mut self, angle_rad: f64, is_lost: bool) {
@@ -90,7 +90,7 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The count concerns the ping a turn ago, between the two.
+            // The ping a turn ago is counted: the wall was detected before and after it.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {
@@ -103,14 +103,14 @@ impl LossCount {
         self.was_lost = is_lost;
     }
 
-    /// Updates the head's health with a ping: its return, or none.
+    /// Updates the head's health with a ping, and its return if any.
     ///
     /// Allocates: never.
     pub fn hear(&mut self, angle_rad: f64, heard: Option<Heard>) {
         let was_deaf = self.hearing.hears_nothing();
         self.hearing.add(angle_rad, heard);
         if was_deaf && heard.is_some() {
-            // Losses during deafness are no evidence for the present ones.
+            // Losses during deafness say nothing about the losses from now on.
             *self = Self { hearing: self.hearing, ..Self::default() };
         }
     }
@@ -120,7 +120,7 @@ impl LossCount {
         &self.hearing
     }
 
-    /// Upper bound of the random losses: all losses, while too few pings have been counted.
+    /// Upper bound of the random losses. All losses count until enough pings have been counted.
     pub fn at_most(&self) -> LossRate {
         if self.by_chance.all >= LEAST {
             self.rate()
@@ -129,7 +129,7 @@ impl LossCount {
         }
     }
 
-    /// Shares lost by chance; all returns for a nearly deaf head.
+    /// Shares of returns lost by chance. For a nearly deaf head all losses count.
     pub fn rate(&self) -> LossRate {
         let deaf = ((self.any.share() - NEARLY_ALL) / (1.0 - NEARLY_ALL)).max(0.0);
         let share = self.by_chance.share();
@@ -145,7 +145,7 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
-    /// A head that turns for this many pings and loses those for which `is_lost` holds.
+    /// Counts of a head that turns for this many pings and loses those for which `is_lost` holds.
     fn turned(pings: u32, is_lost: impl Fn(u32) -> bool) -> LossRate {
         let mut count = LossCount::default();
         for ping in 0..pings {
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn head_that_hears_again_has_lost_nothing() {
+    fn loss_count_restarts_when_a_deaf_head_detects_the_wall_again() {
         let wall = Heard { range_m: 5.0, off_m: 0.0, is_wall: true };
         let mut count = LossCount::default();
         for ping in 0..4000 {
@@ -167,9 +167,9 @@ mod tests {
         assert!(!count.hearing().hears_nothing() && count.rate() == LossRate::default());
     }
 
-    /// Whether a ping is among `in_hundred` of a hundred that are lost.
+    /// Whether a ping is lost at random, `in_hundred` times in a hundred.
     ///
-    /// Splitmix64 makes it uncorrelated with turns of 400 pings.
+    /// Splitmix64 makes the losses uncorrelated with turns of 400 pings.
     fn chance(ping: u32, in_hundred: u64) -> bool {
         let mut z = u64::from(ping).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -178,15 +178,15 @@ mod tests {
     }
 
     #[test]
-    fn random_losses_are_counted_exactly() {
+    fn rate_and_run_length_of_random_losses_are_measured() {
         for in_hundred in [2_u32, 10, 40, 70] {
             let LossRate { share, after_lost } = turned(24_000, |ping| chance(ping, in_hundred.into()));
             let expected = f64::from(in_hundred) / 100.0;
             assert!((share - expected).abs() < 0.03, "{in_hundred}: {share}");
             assert!((after_lost - expected).abs() < 0.08, "{in_hundred}: {after_lost}");
         }
-        // Losses in pairs: after the first of two the second is lost, and after the second the rate is as
-        // before.
+        // Losses come in pairs. After the first loss of a pair the next ping is lost, too; after the second
+        // the usual rate applies.
         let pairs = turned(24_000, |ping| chance(ping / 2, 10));
         assert!((pairs.share - 0.1).abs() < 0.03 && (pairs.after_lost - 0.55).abs() < 0.1, "{pairs:?}");
     }
@@ -200,28 +200,28 @@ mod tests {
             }
             count.at_most()
         };
-        // 280 pings of a turn of 400 are detected, and count once they are detected for the third time.
+        // 280 of the 400 pings of a turn are detected. An angle counts from its third detection on.
         let early = at_most(0..1000);
         assert!(early.share > 0.3 && early.after_lost >= 1.0, "{early:?}");
         assert_eq!(at_most(1000..1100), LossRate::default());
     }
 
     #[test]
-    fn undetected_wall_is_not_lost_by_chance() {
+    fn wall_silent_turn_after_turn_is_not_lost_by_chance() {
         let grazing = turned(8000, |ping| ping % 400 < 120);
         assert!(grazing.share <= 0.0, "{grazing:?}");
         let both = turned(8000, |ping| ping % 400 < 120 || chance(ping, 5));
         assert!((both.share - 0.05).abs() < 0.02, "{both:?}");
-        // Side tunnels, passed for three turns each.
+        // Side tunnels, each passed for three turns.
         let tunnels = turned(24_000, |ping| ping / 400 % 6 > 2 && ping % 400 < 60);
         assert!(tunnels.share <= 0.0, "{tunnels:?}");
     }
 
     #[test]
-    fn deaf_head_has_lost_all_within_some_turns() {
+    fn deaf_head_loses_over_nine_tenths_after_some_turns() {
         let deaf = turned(24_000, |ping| ping >= 4000);
         assert!(deaf.share > 0.9 && deaf.after_lost > 0.9, "{deaf:?}");
-        // A few losses at the beginning count little.
+        // A few losses in the second turn hardly count.
         assert!(turned(410, |ping| ping >= 405).share < 0.03);
         assert_eq!(turned(300, |_| false), LossRate::default());
     }

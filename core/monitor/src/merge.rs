@@ -6,7 +6,7 @@ use super::ring::{PacketHeader, PortReader};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{MAX_SOURCES, Packet, SourceId};
 
-/// Maximum packets per tick. The rest waits for the next tick.
+/// Maximum number of packets per tick. Further packets wait for the next tick.
 pub const MAX_TICK_PACKETS: usize = 4096;
 /// Maximum bytes per tick.
 pub const MAX_TICK_BYTES: usize = 256 * 1024;
@@ -18,7 +18,7 @@ pub struct Inbox {
     bytes: Vec<u8>,
     /// Header of the next packet in each source's ring.
     heads: Vec<Option<PacketHeader>>,
-    /// Bytes that the next tick may take. A lagging lossless outlet lowers it.
+    /// Number of bytes that the next tick may take. A lagging lossless outlet reduces it.
     pub allowance_bytes: usize,
 }
 
@@ -35,7 +35,7 @@ impl Default for Inbox {
         Self {
             packets: Vec::with_capacity(MAX_TICK_PACKETS),
             bytes: Vec::with_capacity(MAX_TICK_BYTES),
-            // The sensors, and the console.
+            // One for each sensor, and one for the console.
             heads: Vec::with_capacity(MAX_SOURCES + 1),
             allowance_bytes: MAX_TICK_BYTES,
         }
@@ -43,19 +43,20 @@ impl Default for Inbox {
 }
 
 impl Inbox {
-    /// An inbox whose lists grow as needed, for a replay's threads.
+    /// An inbox whose lists grow as needed, for the threads of a replay.
     pub(super) fn growing() -> Self {
         Self { packets: Vec::new(), bytes: Vec::new(), heads: Vec::new(), allowance_bytes: MAX_TICK_BYTES }
     }
 
-    /// Exchanges the packets with another's.
+    /// Swaps the packets with those of another inbox.
     pub(super) fn swap_packets(&mut self, other: &mut Self) {
         core::mem::swap(&mut self.packets, &mut other.packets);
         core::mem::swap(&mut self.bytes, &mut other.bytes);
     }
 
-    /// Replaces the packets by another inbox's. If those are more than allowed, it takes none and returns
-    /// false.
+    /// Replaces the packets by those of another inbox.
+    ///
+    /// If they exceed the allowance, returns false, and the inbox is then empty.
     pub(super) fn take_packets(&mut self, other: &Self) -> bool {
         self.packets.clear();
         self.bytes.clear();
@@ -80,19 +81,19 @@ impl Inbox {
         self.packets.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no packets.
     pub fn is_empty(&self) -> bool {
         self.packets.is_empty()
     }
 
-    /// Takes the waiting packets in ascending order of recorded order, receive time, source and sequence.
+    /// Takes the waiting packets. They are sorted by recorded order, then receive time, source and sequence.
     ///
     /// Packets of one source stay in order of arrival, whatever their timestamps. Allocates: never.
     pub(super) fn fill(&mut self, readers: &mut [PortReader]) {
         self.packets.clear();
         self.bytes.clear();
         self.heads.clear();
-        // A ring is read again only once its first packet has been taken.
+        // A ring is looked at again only when its first packet has been taken.
         self.heads.extend(readers.iter().map(PortReader::peek));
         let limit = self.allowance_bytes.min(MAX_TICK_BYTES);
         while self.packets.len() < MAX_TICK_PACKETS {
@@ -139,7 +140,7 @@ mod tests {
     }
 
     proptest! {
-        /// The order doesn't depend on the receive times at which a stream is cut into ticks.
+        /// The order is the same wherever the stream is cut into ticks.
         #[test]
         fn packet_order_does_not_depend_on_ticks(
             packets in proptest::collection::vec((0u64..200, 0u16..4), 1..80),

@@ -1,8 +1,7 @@
 //! Messages between the stages of a tick.
 //!
-//! Each stage processes, in order and without looking ahead, the lists that earlier stages have filled for
-//! this tick. A result therefore depends only on the packets before it, not on where the stream was cut into
-//! ticks.
+//! Earlier stages fill lists for the tick. Each stage processes them in order, without looking ahead. A
+//! result therefore depends only on the packets before it, wherever the stream was cut into ticks.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -26,11 +25,11 @@ use headrace_sensor::reading::{Reading, SourceId};
 /// A reading with its source and times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Source.
+    /// Source of the reading.
     pub source: SourceId,
-    /// Receive time of its packet.
+    /// Receive time of the reading's packet.
     pub received: MonoNs,
-    /// Time of validity.
+    /// Time for which the reading is valid.
     pub valid_at: MonoNs,
     /// Value.
     pub reading: Reading,
@@ -40,38 +39,38 @@ pub struct Event {
 #[derive(Debug, Resource)]
 pub struct Events(pub Vec<Event>);
 
-/// Doubts of navigation at an update.
+/// Doubts that navigation reports at an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Doubts {
-    /// Doubt about the cable counter while it isn't trusted.
+    /// Doubt about the cable counter; `None` while the counter is trusted.
     pub cable: Option<CableDoubt>,
     /// Setting that is likely wrong.
     pub setting: Option<SettingDoubt>,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s.
     pub stand_s: u32,
-    /// Bitmask of the stuck sources: they repeat a reading, and count as silent.
+    /// Bitmask of the stuck sources. They repeat a reading, and count as silent.
     pub hung: u64,
 }
 
 /// An epoch with its fix: a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD), or a sonar ping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Positioned {
-    /// The event with this index is a sonar ping. The fix is for its time of validity.
+    /// The event with this index is a sonar ping. The fix is for the ping's time of validity.
     Ping {
         /// Index into [`Events`].
         event: usize,
-        /// Fix at the ping, or the reason for having none.
+        /// Fix at the ping, or the reason for which there is none.
         fix: Result<Fix, NoFix>,
     },
     /// A multiple of the advice period has passed.
     Beat {
         /// Timestamp.
         at: MonoNs,
-        /// Fix at the update, or the reason for having none.
+        /// Fix at the update, or the reason for which there is none.
         fix: Result<Fix, NoFix>,
         /// Doubts of navigation.
         doubts: Doubts,
-        /// Standard deviations of the pose at that time.
+        /// Standard deviations of the pose at the update.
         sd: Option<PoseSd>,
         /// Index into [`Events`] of the next event.
         before: usize,
@@ -85,25 +84,25 @@ pub struct PositionedList(pub Vec<Positioned>);
 /// Outcome of a ping.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
-    /// A return that could be placed. It becomes a sample if it is accepted as wall.
+    /// A return that could be placed. If it is accepted as wall, it becomes a sample.
     Sample {
         /// End point of the beam.
         point: Point3<Tunnel>,
         /// Its arc length, m.
         arc_m: f64,
     },
-    /// No sample, with the reason and the point aimed at; `None` without a fix or a wall in that direction.
+    /// No sample, for this reason. The aim is the point at which the beam meets the design, if it is known.
     Lost(Loss, Option<Aim>),
-    /// A return without a fix, with the reason.
+    /// A return without a fix, with the reason for the missing fix.
     Unplaced(NoFix),
 }
 
-/// Whether the vehicle occludes a beam, by its geometry.
+/// Whether the vehicle occludes a beam, by the geometry of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Hidden {
     /// Not occluded.
     No,
-    /// Nearly occluded: a return is possible.
+    /// The beam passes close to the vehicle. A return is possible.
     Beside,
     /// Occluded.
     Yes,
@@ -129,15 +128,15 @@ pub struct PlacedPing {
     pub valid_at: MonoNs,
     /// Fix at that time.
     pub fix: Option<Fix>,
-    /// Chainages on which the head lands samples at this attitude; `None` without a fix.
+    /// Chainages at which the head places samples at this attitude; `None` without a fix.
     pub reach: Option<Reach>,
-    /// The head has moved a single step since its previous ping.
+    /// Whether the head has moved a single step since its previous ping.
     pub single_step: bool,
-    /// A new sweep has begun.
+    /// Whether a new sweep has begun.
     pub new_sweep: bool,
-    /// The head is stalled.
+    /// Whether the head is stalled.
     pub standing: bool,
-    /// Outcome.
+    /// Outcome of the ping.
     pub outcome: Outcome,
     /// Angle of the head, in the sensor frame, radians.
     pub angle_rad: f64,
@@ -165,7 +164,9 @@ pub enum Placed {
 #[derive(Debug, Resource)]
 pub struct PlacedList(pub Vec<Placed>);
 
-/// Index into [`Events`] for each item of [`PlacedList`]: of the ping, or of the event after a situation.
+/// For each item of [`PlacedList`], an index into [`Events`].
+///
+/// It is the index of the ping, or of the event after the situation.
 #[derive(Debug, Resource)]
 pub struct PlacedEvents(pub Vec<usize>);
 
@@ -176,9 +177,9 @@ pub struct Standing {
     pub metres: LiveMetres,
     /// Last judged unsure stretch.
     pub unsure: Option<Stretch>,
-    /// All wall that heads see here has passed.
+    /// Whether all wall that the heads see here has passed.
     pub passed: bool,
-    /// Place to go back to for a missed stretch, m, while the vehicle is on its way there.
+    /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
     pub back_to_m: Option<f64>,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
@@ -218,7 +219,7 @@ pub enum Notice {
         /// Kind of change.
         change: RunChange,
     },
-    /// First occurrence of an alert, and the head if it names one.
+    /// First occurrence of an alert. The source is the head, if the alert names one.
     Alert(AlertKind, Option<SourceId>),
     /// Speed advice.
     Advice(AdviceEntry),

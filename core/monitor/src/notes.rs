@@ -7,15 +7,15 @@ use super::console::{NoteText, Who};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 
-/// Maximum number of notes taken and kept in a dive. Further notes of an older log remain in the log only.
+/// Maximum number of notes in a dive. If an older log has more, the rest stay in the log only.
 pub const MOST_NOTES: usize = 1000;
 
-/// Recording of a voice note.
+/// Recording that belongs to a voice note.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Spoken {
     /// Id that ties the note to its recording in the log.
     pub id: u32,
-    /// Length of its recording, seconds; 0 until a recording is in the log.
+    /// Length of the recording, seconds; 0 until the recording is in the log.
     pub seconds: u32,
 }
 
@@ -30,7 +30,7 @@ pub struct Note {
     pub by: Who,
     /// Text; empty for a mark.
     pub text: NoteText,
-    /// Recording, for a voice note; it has no text.
+    /// Recording of a voice note, which has no text.
     pub voice: Option<Spoken>,
     /// Place of the vehicle at the last update, m; `None` without a position.
     pub chainage_m: Option<f64>,
@@ -46,26 +46,26 @@ pub struct Notes {
 stateful!(Notes { state: taken; lists: notes; });
 
 impl Default for Notes {
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory of the list.
     fn default() -> Self {
         Self { notes: Vec::with_capacity(MOST_NOTES), taken: 0 }
     }
 }
 
 impl Notes {
-    /// Takes a note. Returns it with its number.
+    /// Adds a note. Returns the note with its number.
     pub(crate) fn take(&mut self, at: MonoNs, by: Who, text: NoteText, chainage_m: Option<f64>) -> Note {
         self.keep(&Note { number: 0, at, by, text, voice: None, chainage_m })
     }
 
-    /// Takes a voice note whose recording begins. Returns it with its number.
+    /// Adds a voice note when its recording begins. Returns the note with its number.
     pub(crate) fn speak(&mut self, at: MonoNs, by: Who, id: u32, chainage_m: Option<f64>) -> Note {
         let voice = Some(Spoken { id, seconds: 0 });
         self.keep(&Note { number: 0, at, by, text: NoteText::default(), voice, chainage_m })
     }
 
-    /// Records that the log has a voice note's recording. Returns the note; `None` if no kept note waits for
-    /// it.
+    /// Records that a voice note's recording is in the log. Returns the note; `None` if no kept note waits
+    /// for the recording.
     pub(crate) fn spoken(&mut self, id: u32, seconds: u32) -> Option<Note> {
         let waits = Some(Spoken { id, seconds: 0 });
         let note = self.notes.iter_mut().rev().find(|note| note.voice == waits)?;
@@ -87,12 +87,12 @@ impl Notes {
         self.notes.iter()
     }
 
-    /// Note with a number.
+    /// Note with this number.
     pub fn get(&self, number: u32) -> Option<&Note> {
         self.notes.get(usize::try_from(number).ok()?.checked_sub(1)?)
     }
 
-    /// Number of notes not kept.
+    /// Number of notes that were not kept.
     pub fn dropped(&self) -> u32 {
         self.taken - u32::try_from(self.notes.len()).unwrap_or(u32::MAX)
     }

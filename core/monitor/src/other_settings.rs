@@ -1,6 +1,6 @@
 //! Effect of other head settings: a finer step or a longer range.
 //!
-//! Both take longer to turn, which counts when a section's hole is predicted for them.
+//! With either, a turn takes longer. The prediction of a section's hole allows for that.
 
 use bevy_ecs::prelude::World;
 
@@ -16,9 +16,9 @@ use headrace_sampling::spacing::speed_for_target_mps;
 use headrace_sensor::device::Device;
 use headrace_vehicle::Mission;
 
-/// Range settings tried: whole metres up to this one.
+/// Longest range setting tried, m. Settings are tried in whole metres.
 const LONGEST_M: u32 = 200;
-/// Steps closer together than this are equal, radians.
+/// Maximum difference between equal steps, radians.
 const SAME_STEP_RAD: f64 = 1e-6;
 
 impl HeadSpecification {
@@ -28,11 +28,12 @@ impl HeadSpecification {
         Self { spec, modes, reaching: reaching(device, &spec, mission) }
     }
 
-    /// Alternative settings in a tunnel inspected with target T, m. `name` is the id of its source.
+    /// Alternative settings in a tunnel inspected with target T, m. `name` is the id of the head's source.
     pub fn settings(&self, name: &str, profile: &Profile, target_m: f64) -> HeadSettings {
         let [_, own_m] = self.spec.range_m;
         let range_m = self.reaching.as_ref().map(|(range_m, _)| *range_m);
-        // As many rays as live advice uses: its mode is on the same screen.
+        // The live advice uses the same number of rays. Both name modes on the same screen, so the modes must
+        // agree.
         let rays = Looks::default().ring;
         let ring = self.ring_in_the_middle(profile, rays).unwrap_or_default();
         let finer = self.finer(target_m, |step_rad| ring.largest_step_m(Ring::stride(step_rad, rays)));
@@ -43,7 +44,8 @@ impl HeadSpecification {
         }
     }
 
-    /// Mode with a finer step that allows the fastest speed; the finest one if none meets the target.
+    /// Among the modes with a finer step, the one that allows the fastest speed. If none meets the target:
+    /// the finest one.
     ///
     /// `t_y_m` converts a step of the head, radians, to the step along the wall, m.
     fn finer(&self, target_m: f64, t_y_m: impl Fn(f64) -> f64) -> Option<&HeadMode> {
@@ -67,11 +69,9 @@ impl HeadSpecification {
     }
 }
 
-/// Shortest range setting that reaches all wall from the tunnel's centre, m, and the modes there.
+/// Shortest range setting that reaches all wall from the tunnel's centre, m, and the modes at that setting.
 ///
-/// It is the head's own setting or a longer one.
-///
-/// `None` if no setting does.
+/// The setting is the head's own or a longer one. `None` if no setting reaches all wall.
 fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(f64, Vec<HeadMode>)> {
     let profile = &mission.profile;
     let wall_m = profile.farthest_m(profile.reference());
@@ -84,7 +84,7 @@ fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(
     longer_m.into_iter().find_map(|range_m| Some((range_m, device.modes(Some(range_m)).ok()?)))
 }
 
-/// Ratios of the head that changes most: the slowest head decides for the vehicle.
+/// Largest ratios among the heads: the head with the largest change decides for the vehicle.
 pub(super) fn of_heads(world: &mut World, profile: &Profile, target_m: f64) -> OtherSettings {
     let mut heads = world.query::<&HeadSpecification>();
     let farthest_m = profile.farthest_m(profile.reference());
@@ -104,7 +104,7 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    // The steps are those of perpendicular beams. The samples of the trial show whether a mode would also be
+    // The steps assume perpendicular beams. The samples of the trial show whether the mode is also fine
     // enough in corners.
     let chosen = head.finer(target_m, |step_rad| step_rad * farthest_m);
     OtherSettings {
@@ -143,20 +143,20 @@ mod tests {
     }
 
     #[test]
-    fn fastest_mode_is_chosen_with_its_longer_turn() {
-        // On wall 6 m away, 0.9 degrees make 0.094 m, and 0.6 degrees 0.063 m.
+    fn mode_with_the_fastest_speed_is_chosen_with_its_turn_period() {
+        // At 6 m from the wall, 0.9 degrees are 0.094 m, and 0.6 degrees are 0.063 m.
         let at = |target_m: f64| of_head(&head(2.4, None), 6.0, target_m);
         let roomy = at(0.2);
         assert!((roomy.finer_step - 0.375).abs() < 1e-9 && (roomy.finer_turn - 8.0 / 4.8).abs() < 1e-9);
         let close = at(0.1);
         assert!((close.finer_step - 0.25).abs() < 1e-9 && (close.finer_turn - 10.8 / 4.8).abs() < 1e-9);
-        // None meets the target: the finest one is taken.
+        // No mode meets the target, so the finest one is chosen.
         assert_eq!(at(0.01), close);
         let finest = of_head(&head(0.6, None), 6.0, 0.2);
         assert_eq!((finest.finer_step, finest.finer_turn, finest.longer_turn), (1.0, 1.0, 1.0));
     }
 
-    /// In a corner, or where beams graze the wall, a step is longer than for perpendicular beams.
+    /// In a corner, or at a grazing angle, a step along the wall is longer than for a perpendicular beam.
     #[test]
     fn oblique_wall_needs_a_finer_mode() {
         let ceran = shapes::ceran().unwrap();

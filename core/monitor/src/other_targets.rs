@@ -1,11 +1,11 @@
-//! Alternatives: verdicts on a dive's samples for other targets and section lengths.
+//! Alternatives: verdicts on the samples of a dive for other targets and section lengths.
 
 use headrace_coverage::Verdict;
 use serde::Serialize;
 
 use super::run::Loop;
 
-/// Metres by verdict for another target, or in sections of another length.
+/// Metres by verdict, for another target or another section length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OtherTargetReport {
     /// Target T, m.
@@ -25,7 +25,9 @@ pub struct OtherTargetReport {
 }
 
 impl Loop {
-    /// Present verdicts for another target, by section, of those whose hole has been measured.
+    /// Present verdicts for another target, as section index and verdict.
+    ///
+    /// Only sections whose hole has been measured are included.
     pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {
         self.coverage().sections.verdicts_at(target_m, &self.outlook()).collect()
     }

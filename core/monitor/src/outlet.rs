@@ -11,12 +11,12 @@ use super::error::PluginError;
 use super::messages::{Notice, Notices};
 use super::stage::Stage;
 
-/// Copies every notice into a queue. On overflow the oldest notices are dropped and counted.
+/// Copies every notice into a queue. If the queue is full, the oldest notice is dropped and counted.
 pub struct NoticeOutlet {
     queue: Arc<Shared>,
 }
 
-/// Receiving end of a [`NoticeOutlet`].
+/// Receiving end of a [`NoticeOutlet`]'s queue.
 #[derive(Clone)]
 pub struct NoticeReceiver {
     queue: Arc<Shared>,
@@ -31,7 +31,7 @@ struct Shared {
 struct Outlet(Arc<Shared>);
 
 impl NoticeOutlet {
-    /// A queue for `capacity` notices, with its receiving end.
+    /// Creates a queue for `capacity` notices, with its receiving end.
     pub fn new(capacity: usize) -> (Self, NoticeReceiver) {
         let queue =
             Arc::new(Shared { notices: ArrayQueue::new(capacity.max(1)), dropped: AtomicU64::new(0) });
@@ -57,12 +57,12 @@ fn publish(notices: Res<'_, Notices>, outlet: Res<'_, Outlet>) {
 }
 
 impl NoticeReceiver {
-    /// Oldest waiting notice.
+    /// Takes the oldest waiting notice.
     pub fn next(&self) -> Option<Notice> {
         self.queue.notices.pop()
     }
 
-    /// Number of notices dropped by overflow.
+    /// Number of notices dropped because the queue was full.
     pub fn dropped(&self) -> u64 {
         self.queue.dropped.load(Ordering::Relaxed)
     }

@@ -16,7 +16,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Advice, Reason, Remedy};
 use headrace_sampling::head::HeadSet;
 
-/// Chainage as stationing, kilometres, then metres with two decimals: 1+240.50 for 1240.5 m.
+/// Chainage as stationing: kilometres, then metres with two decimals. Example: 1+240.50 for 1240.5 m.
 pub fn station(chainage_m: f64) -> String {
     let sign = if chainage_m < -0.005 { "-" } else { "" };
     let centimetres = (chainage_m.abs() * 100.0).round();
@@ -31,10 +31,10 @@ pub fn clock_text(profile: &Profile, arc_m: f64) -> String {
     clock.strip_suffix(":00").map_or(clock.clone(), |hour| format!("{hour} o'clock"))
 }
 
-/// Figures of a cause's evidence for its text.
+/// Figures from the evidence of a fail, for the text of its causes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CauseFigures {
-    /// Causes, which only together explain the fail.
+    /// Causes that explain the fail together.
     pub causes: Causes,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
@@ -42,9 +42,9 @@ pub struct CauseFigures {
     pub t_y_m: f64,
     /// Largest step predicted from the tunnel's centre, m.
     pub middle_t_y_m: f64,
-    /// Share of pings without a return.
+    /// Share of pings that gave no return.
     pub missing_share: f64,
-    /// Advice for passing again, with the heads as scheduled.
+    /// Advice for passing the stretch again, with the heads as scheduled.
     pub again: Again,
     /// Distance that the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
@@ -62,7 +62,8 @@ impl From<&Evidence> for CauseFigures {
 }
 
 impl CauseFigures {
-    /// Figures of a run: for each named cause, those of the section that represents it.
+    /// Figures of a run. For each cause that the text names, the figures come from the section that
+    /// represents the cause.
     pub fn of_run(sections: &Sections, run: &Run) -> Option<Self> {
         let causes = run.named();
         let main = Self::from(&sections.evidence_of(run, run.cause)?);
@@ -75,7 +76,7 @@ impl CauseFigures {
         Some(figures)
     }
 
-    /// Takes the figures that a cause's text needs from its evidence.
+    /// Copies the figures that a cause's text needs from the evidence.
     fn take(&mut self, cause: Cause, from: &Evidence) {
         match cause {
             Cause::TooFast | Cause::Phase => self.speed_mps = from.speed_mps,
@@ -93,9 +94,10 @@ impl CauseFigures {
         }
     }
 
-    /// Speed for passing again, m/s, given the speed advised now.
+    /// Speed for passing the stretch again, m/s. `v_max_mps` is the speed advised now.
     ///
-    /// It is that of the heads as scheduled if these have to be mended first, otherwise the lower of the two.
+    /// If the heads have to be mended first, the speed is that of the heads as scheduled. Otherwise it is the
+    /// lower of the two.
     pub fn again_mps(&self, v_max_mps: f64) -> f64 {
         let mended =
             [Cause::HeadSilent, Cause::HeadStalled, Cause::Phase, Cause::AngularStep, Cause::OutOfRange];
@@ -123,7 +125,7 @@ impl CauseFigures {
 /// Maximum number of causes named in a text.
 const NAMED: usize = 2;
 
-/// Text of a fail's causes with their figures; the first two if there are several.
+/// Text of a fail's causes with their figures. If there are several causes, the first two are named.
 pub fn cause_text(figures: &CauseFigures, heads: &HeadDescriptions) -> String {
     let texts: Vec<String> =
         figures.causes.iter().take(NAMED).map(|cause| one_cause_text(cause, figures, heads)).collect();
@@ -150,9 +152,11 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadDescriptions
     }
 }
 
-/// Text of the actions for a missed stretch, as in [`action_text`]; the first two if there are several.
+/// Text of the actions for a missed stretch, as in [`action_text`]. If there are several actions, the first
+/// two are named.
 ///
-/// An action needed before the vehicle goes back comes first. Slower is part of the speed.
+/// An action that is needed before the vehicle goes back comes first. The action "slower" is given by the
+/// speed.
 pub fn actions_text(
     actions: &[Action],
     back_to_m: f64,
@@ -163,7 +167,7 @@ pub fn actions_text(
     if let [_, Action::Position | Action::HeadBack] = two.as_slice() {
         two.reverse();
     }
-    // The speed covers it, or the first action states that slower won't help.
+    // The stated speed covers this action, or the first action states that slower won't help.
     if let [first, Action::Slower] = two.as_slice()
         && (at_most_mps > 0.0 || matches!(first, Action::FinerMode | Action::HigherGain))
     {
@@ -174,7 +178,7 @@ pub fn actions_text(
     others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second, heads)))
 }
 
-/// Text of an action next to another one.
+/// Text of an action that follows another one.
 fn short_text(action: Action, heads: &HeadDescriptions) -> String {
     let text = match action {
         Action::Slower => "slower",
@@ -192,23 +196,23 @@ fn short_text(action: Action, heads: &HeadDescriptions) -> String {
     text.to_owned()
 }
 
-/// Text of an action for a missed stretch: go back to a chainage, m, with a maximum speed, m/s.
+/// Text of an action for a missed stretch: go back to a chainage, m, then pass at no more than a speed, m/s.
 ///
 /// The speed is zero if no known speed meets the target.
 pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &HeadDescriptions) -> String {
     let back = format!("go back to {}", station(back_to_m));
     let text = match action {
-        // The speed would be for the present mode and range setting.
+        // No speed is stated: it would apply to the present mode and range setting only.
         Action::FinerMode => return format!("slower won't help: {}, then {back}", heads.set_finer()),
         Action::LongerRange => return format!("set {}, then {back}", heads.longer_range()),
-        // Elsewhere in the stretch a speed helps.
+        // A speed is stated because it helps in other parts of the stretch.
         Action::HigherGain if at_most_mps > 0.0 => format!("{back}, then with a higher gain,"),
         Action::HigherGain => return "slower won't help, a higher gain may".to_owned(),
         Action::Slower if at_most_mps > 0.0 => format!("{back}, then"),
         Action::Slower => back,
         Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
-        // Slower than that, heads apart along the hull are out of phase again.
+        // The exact speed is stated: below it, heads apart along the hull are out of phase again.
         Action::InPhase if at_most_mps > 0.0 => {
             return format!("{back}, then with the heads in phase, at {at_most_mps:.2} m/s");
         }
@@ -225,7 +229,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
     }
 }
 
-/// Remedy if lower speed does not help.
+/// Text of the remedy for a stretch that a lower speed does not help.
 fn remedy_text(remedy: Option<Remedy>) -> String {
     match remedy {
         Some(Remedy::HoldHeading) => "hold the heading: the beams swing".to_owned(),
@@ -235,7 +239,7 @@ fn remedy_text(remedy: Option<Remedy>) -> String {
     }
 }
 
-/// Text of the missing requirement for a position.
+/// Text of the requirement that is missing for a position.
 pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
     match lacking {
         NoFix::Heading => "NO POSITION: heading unknown",
@@ -244,10 +248,10 @@ pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
     }
 }
 
-/// Text of the setting that allows more speed.
+/// Text of the setting that allows a higher speed.
 ///
-/// It is the remedy if slower doesn't help, otherwise a mode that all heads have and that allows a higher
-/// speed.
+/// If a lower speed doesn't help, it is the remedy. Otherwise it is a mode that all heads have and that
+/// allows a higher speed.
 pub fn gain_text(advice: &Advice, heads: &HeadDescriptions) -> Option<String> {
     if advice.remedy.is_some() {
         return Some(remedy_text(advice.remedy));
@@ -269,23 +273,23 @@ pub(super) fn speed_text(what: &str, mps: f64) -> String {
     if mps > 0.0 { format!("{what} {mps:.2} m/s") } else { String::new() }
 }
 
-/// Ratio of speeds above which another mode is worth mentioning.
+/// Ratio of speeds above which a faster mode is displayed.
 const GAIN: f64 = 1.1;
 
 /// A missed stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
-    /// Its beginning, m.
+    /// Beginning of the stretch, m.
     pub start_m: f64,
-    /// Place for the vehicle to go back to, m.
+    /// Chainage to which the vehicle has to go back, m.
     pub back_to_m: f64,
-    /// Cause with its figures.
+    /// Causes with their figures.
     pub figures: CauseFigures,
-    /// Arc length of its largest hole, m.
+    /// Arc length of the stretch's largest hole, m.
     pub hole_arc_m: f64,
     /// Target T, m.
     pub target_m: f64,
-    /// Speed advised now, m/s; zero if none.
+    /// Speed advised now, m/s; zero if none is advised.
     pub v_max_mps: f64,
 }
 
@@ -301,12 +305,13 @@ pub fn flag_text(missed: &Missed, profile: &Profile, heads: &HeadDescriptions) -
     )
 }
 
-/// Text of a stretch that was passed again and is no longer flagged.
+/// Text for a stretch that was passed again and is no longer flagged.
 pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// Text of an alert at a chainage, m, with the deviation, m, and the head or velocity log if it names one.
+/// Text of an alert at a chainage, m. `off_m` is the deviation, m; `head` is the head or velocity log, if the
+/// alert names one.
 pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
     let x = station(x_m);
     match kind {
@@ -362,7 +367,7 @@ pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String
     format!("ch {}  {what}", station(x_m))
 }
 
-/// Figures of advice used in its text.
+/// Figures for the text of an advice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AdviceFigures {
     /// Present speed, m/s.
@@ -371,15 +376,15 @@ pub struct AdviceFigures {
     pub v_max_mps: f64,
     /// Limiting factor.
     pub reason: Reason,
-    /// The present turn will exceed the target.
+    /// Whether the present turn will exceed the target.
     pub will_exceed: bool,
     /// Phase error of the heads, radians.
     pub phase_error_rad: f64,
     /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
-    /// Strip that no head sees: its width, and the arc length of its centre, m.
+    /// Strip of wall that no head sees: width and arc length of its centre, m.
     pub unseen_m: Option<[f64; 2]>,
-    /// Remedy if lower speed does not help.
+    /// Remedy if a lower speed does not help.
     pub remedy: Option<Remedy>,
 }
 
@@ -479,7 +484,7 @@ mod tests {
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25, &two()),
             "go back to 1+240.50, then at most 0.25 m/s; and again, rolled left, then right"
         );
-        // If a speed helps elsewhere in the stretch, the text doesn't state that slower won't.
+        // A speed helps in other parts of the stretch, so the text doesn't state that slower won't help.
         let lossy = [Action::HigherGain, Action::Slower];
         assert_eq!(
             actions_text(&lossy, 1240.5, 0.25, &two()),

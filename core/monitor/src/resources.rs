@@ -17,7 +17,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::reading::SourceId;
 
-/// Tunnel as designed, and its water.
+/// The tunnel as designed, and the water in it.
 #[derive(Debug, Clone, Resource)]
 pub struct TunnelDesign {
     /// Design profile.
@@ -26,7 +26,7 @@ pub struct TunnelDesign {
     pub site: Site,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// Samples farther than this from the design profile contradict it, m.
+    /// Deviation from the design profile beyond which a sample contradicts the profile, m.
     pub contradiction_m: f64,
     /// Limits for accepting returns as wall.
     pub limits: WallLimits,
@@ -41,7 +41,7 @@ pub struct Target {
     pub layout: HeadLayout,
     /// Speed for which the heads are set in phase, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
-    /// Changes that other settings of the heads would bring.
+    /// Effect of other head settings.
     pub(super) other: OtherSettings,
 }
 
@@ -59,7 +59,7 @@ impl VehicleEntities {
         core::iter::once(self.vehicle).chain(self.by_source.iter().copied())
     }
 
-    /// Sensor that a source's bytes come from.
+    /// Sensor whose bytes come from this source.
     pub fn of_source(&self, source: SourceId) -> Option<Entity> {
         self.by_source.get(source.index()).copied()
     }
@@ -70,18 +70,18 @@ impl VehicleEntities {
     }
 }
 
-/// Coverage of the wall.
+/// Coverage of the wall: the samples, the verdicts, and the data from which the verdicts are formed.
 #[derive(Debug, Resource)]
 pub struct Coverage {
     /// Samples.
     pub store: SampleStore,
     /// Verdicts.
     pub sections: Sections,
-    /// Stretch where samples may still land.
+    /// Chainages at which samples may still land.
     pub frontier: Frontier,
     /// Samples by node of a square grid.
     pub soundings: Soundings,
-    /// Places near the vehicle where the wall was found off the design.
+    /// Places near the vehicle at which the wall was found to deviate from the design.
     pub relief: Relief,
     /// Last judged unsure stretch.
     pub unsure: Option<Stretch>,
@@ -91,7 +91,7 @@ pub struct Coverage {
 
 stateful!(Coverage { state: store, sections, frontier, soundings, relief, unsure, lacks; });
 
-/// Search for holes, with its working memory.
+/// Hole search, with its working memory.
 #[derive(Debug, Default, Resource)]
 pub struct Finder(pub HoleFinder);
 
@@ -105,7 +105,7 @@ impl Stateful for Finder {
     }
 }
 
-/// Result streams with their digests, which together give the dive's digest.
+/// Result streams. Their digests together give the digest of the dive.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
     /// Poses at the updates.
@@ -114,7 +114,7 @@ pub struct Digests {
     pub pings: ResultStream,
     /// Judgements.
     pub judgements: ResultStream,
-    /// Advice.
+    /// The advice.
     pub advice: ResultStream,
     /// Live states at the updates.
     pub states: ResultStream,
@@ -137,7 +137,7 @@ impl Digests {
         ]
     }
 
-    /// Keeps the words of each tick from now on.
+    /// Keeps the words of each tick from now on. Allocates: once, all memory for the words.
     pub fn keep(&mut self) {
         self.poses.keep();
         self.pings.keep();
@@ -170,7 +170,7 @@ pub struct Tally {
     pub missing: u64,
     /// Pings without a return because the wall was out of range.
     pub out_of_range: u64,
-    /// Pings occluded by the vehicle.
+    /// Pings that the vehicle occluded.
     pub occluded: u64,
     /// Returns without a fix.
     pub unplaced: u64,
@@ -182,7 +182,7 @@ pub struct Tally {
     pub outside: u64,
     /// Samples not stored for lack of room.
     pub not_stored: u64,
-    /// Returns not accepted as wall.
+    /// Returns that were not accepted as wall.
     pub doubtful: u64,
 }
 
@@ -191,6 +191,6 @@ pub struct Tally {
 pub struct TickTime {
     /// Number from zero.
     pub index: u64,
-    /// End of its time.
+    /// End of the tick's time.
     pub now: MonoNs,
 }

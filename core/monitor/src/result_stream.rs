@@ -1,21 +1,21 @@
 //! Published results: hashed, and kept word by word for recording or comparison.
 //!
-//! A stream is a sequence of records. A record is a header followed by its words: integers, or the bits of
-//! floating-point numbers. The header has the record's kind in its lowest byte and the number of words above
-//! it. Only words are hashed.
+//! A stream is a sequence of records. A record is a header, followed by words. A word is an integer, or the
+//! bits of a floating-point number. The lowest byte of the header is the record's kind, and the bytes above
+//! it are the number of words. Only words are hashed.
 
 use super::digest::Digest;
 use headrace_geometry::snapshot::stateful;
 
-/// Capacity of a stream per tick, words. Further words are hashed, but not kept, and counted as lost.
+/// Capacity of a stream per tick, words. Words beyond it are hashed, but they are not kept and count as lost.
 const MAX_TICK_WORDS: usize = 1 << 16;
 
 /// Kind of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordKind {
-    /// A ping with a sample.
+    /// A ping that gave a sample.
     Sample = 1,
-    /// A ping without a sample.
+    /// A ping that gave no sample.
     NoSample = 2,
     /// A judged section.
     Section = 3,
@@ -23,13 +23,13 @@ pub enum RecordKind {
     Run = 4,
     /// Advice.
     Advice = 5,
-    /// Pose of the vehicle.
+    /// A pose of the vehicle.
     Pose = 6,
-    /// A pose without a fix.
+    /// An update without a fix.
     NoPose = 7,
     /// An alert about the dive as a whole.
     Alert = 8,
-    /// A ping with a return that was not accepted as wall.
+    /// A ping whose return was not accepted as wall.
     Doubtful = 9,
     /// The live state.
     State = 10,
@@ -37,7 +37,7 @@ pub enum RecordKind {
     AlertChange = 11,
     /// A note.
     Note = 12,
-    /// A voice note; repeated once its recording is in the log.
+    /// A voice note. The record is repeated once the note's recording is in the log.
     Voice = 13,
 }
 
@@ -61,7 +61,7 @@ const SECTION: [(&str, WordKind); 17] = [
     ("cause", WordKind::Integer),
     ("hole_x_m", WordKind::Number),
     ("hole_arc_m", WordKind::Number),
-    // Words from here on are present only with a cause.
+    // The words from here on are present only if the section has a cause.
     ("speed_mps", WordKind::Number),
     ("t_y_m", WordKind::Number),
     ("middle_t_y_m", WordKind::Number),
@@ -102,7 +102,7 @@ const VOICE: [(&str, WordKind); 7] = [
     ("id", WordKind::Integer),
     ("seconds", WordKind::Integer),
 ];
-/// Words of a note. Its text follows.
+/// Words of a note. The words of its text follow.
 const NOTE: [(&str, WordKind); 5] = [
     ("at_ns", WordKind::Integer),
     ("number", WordKind::Integer),
@@ -193,7 +193,7 @@ impl RecordKind {
                 ("j", Number),
                 ("k", Number),
                 ("speed_mps", Number),
-                // Present only if navigation provides them.
+                // Present only if navigation provides standard deviations.
                 ("along_sd_m", Number),
                 ("place_sd_m", Number),
                 ("tilt_sd_rad", Number),
@@ -226,15 +226,15 @@ impl RecordKind {
                 ("kind", Integer),
                 ("x_m", Number),
                 ("off_m", Number),
-                // Present only for a head.
+                // Present only if the alert names a source.
                 ("source", Integer),
             ],
             Self::AlertChange => &ALERT_CHANGE,
             Self::Note => &NOTE,
             Self::Voice => &VOICE,
         };
-        // Further words follow: for advice the speeds that other modes allow, for the live state each
-        // source's last reading, for a note its text.
+        // Words beyond the last field repeat. Advice has the speeds that other modes allow. The live state
+        // has each source's last reading. A note has its text.
         let beyond = match self {
             Self::Advice => ("alternative_v_max_mps", Number),
             Self::State => ("heard_ns", Integer),
@@ -260,7 +260,7 @@ pub struct ResultStream {
 stateful!(ResultStream { state: digest, records, lost; fixed: words, room, head; });
 
 impl ResultStream {
-    /// Keeps the words of each tick from now on. Allocates: all that it will ever use.
+    /// Keeps the words of each tick from now on. Allocates: once, all memory for the words.
     pub fn keep(&mut self) {
         self.room = MAX_TICK_WORDS;
         self.words.reserve_exact(self.room);
@@ -281,7 +281,7 @@ impl ResultStream {
         self
     }
 
-    /// Adds a number bit by bit; -0 counts as +0.
+    /// Adds the bits of a number; -0 counts as +0.
     pub(super) fn number(&mut self, value: f64) -> &mut Self {
         self.digest.number(value);
         self.word((value + 0.0).to_bits());
@@ -319,7 +319,7 @@ impl ResultStream {
         self
     }
 
-    /// Copies the state of another stream, with the words that its last tick has kept.
+    /// Copies the state of another stream, with the words of its last tick.
     pub(super) fn follow(&mut self, other: &Self) {
         (self.digest, self.records, self.lost) = (other.digest, other.records, other.lost);
         self.words.clear();
@@ -353,20 +353,22 @@ impl ResultStream {
 /// One record of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record<'a> {
-    /// Kind; `None` if unknown to this version.
+    /// Kind; `None` if this version doesn't know it.
     pub kind: Option<RecordKind>,
     /// Words.
     pub words: &'a [u64],
 }
 
-/// Text held by two words of a record.
+/// Text encoded in two words of a record.
 pub fn text_of(words: [u64; 2]) -> String {
     let bytes = words.map(u64::to_le_bytes);
     let text = bytes.as_flattened().iter().copied().take_while(|byte| *byte != 0).collect::<Vec<_>>();
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// First of a sequence of records, and the rest; `None` at the end, or if a record is incomplete.
+/// First of a sequence of records, and the words after it.
+///
+/// `None` if there are no more words, or if the record is incomplete.
 pub fn first_record(words: &[u64]) -> Option<(Record<'_>, &[u64])> {
     let (head, rest) = words.split_first()?;
     let [kind, ..] = head.to_le_bytes();
@@ -411,7 +413,7 @@ mod tests {
         }
     }
 
-    /// Neither keeping words nor running out of room changes a digest.
+    /// The digest depends neither on whether words are kept, nor on whether there is room for them.
     #[test]
     fn digest_depends_only_on_the_words() {
         let mut plain = ResultStream::default();

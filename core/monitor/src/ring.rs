@@ -12,7 +12,7 @@ const HEADER_BYTES: usize = 20;
 /// Maximum packet length, bytes.
 pub const MAX_PACKET_BYTES: usize = 4096;
 
-/// Order of live packets. Replayed packets have the order of consumption recorded in the log.
+/// Value of `order` in live packets. In replayed packets it is the order of consumption recorded in the log.
 pub const NO_ORDER: u64 = u64::MAX;
 
 /// Reason for which a packet was not written.
@@ -27,10 +27,10 @@ pub enum RingError {
         /// Bytes needed, header included.
         needed: usize,
     },
-    /// The packet is longer than [`MAX_PACKET_BYTES`].
+    /// The packet has more than [`MAX_PACKET_BYTES`].
     #[error("writing a packet of {len} bytes: at most {MAX_PACKET_BYTES} bytes are allowed")]
     TooLong {
-        /// Its length.
+        /// Length of the packet.
         len: usize,
     },
 }
@@ -60,7 +60,7 @@ pub(super) fn ring(capacity_bytes: usize) -> (Port, PortReader) {
 }
 
 impl<R: ByteProducer> Port<R> {
-    /// Creates the writing end of a ring.
+    /// Wraps the writing end of a ring.
     pub(super) fn on(ring: R) -> Self {
         Self { ring }
     }
@@ -89,7 +89,7 @@ impl<R: ByteProducer> Port<R> {
         time.copy_from_slice(&received.0.to_le_bytes());
         place.copy_from_slice(&order.to_le_bytes());
         length.copy_from_slice(&len.to_le_bytes());
-        // The reader waits for the whole packet, so two writes need no synchronisation.
+        // The reader waits until the whole packet is present, so the two writes need no synchronisation.
         self.ring.push(&header);
         self.ring.push(bytes);
         Ok(())
@@ -102,7 +102,7 @@ impl<R: ByteProducer> Port<R> {
 }
 
 impl<R: ByteConsumer> PortReader<R> {
-    /// Creates the reading end of a ring.
+    /// Wraps the reading end of a ring.
     pub(super) fn on(ring: R) -> Self {
         Self { ring }
     }
@@ -128,7 +128,7 @@ impl<R: ByteConsumer> PortReader<R> {
         self.ring.skip(usize::MAX);
     }
 
-    /// Reads the packet that [`PortReader::peek`] returned into `into`, which must have the packet's length.
+    /// Reads the packet whose header [`PortReader::peek`] returned. `into` must have the packet's length.
     pub(super) fn take(&mut self, into: &mut [u8]) {
         self.ring.skip(HEADER_BYTES);
         self.ring.pop(into);
@@ -169,7 +169,7 @@ mod model_tests {
     use super::*;
     use crate::byte_ring::model::{Hasty, ModelConsumer, explore, packets_by};
 
-    /// Packets of different length and content, for a ring that holds one of them and the header of the next.
+    /// Lengths of two packets. The ring holds one packet and the header of the other.
     const LENGTHS: [usize; 2] = [3, 5];
     const CAPACITY: usize = 2 * HEADER_BYTES + 5;
 
@@ -177,7 +177,8 @@ mod model_tests {
         (0..LENGTHS[number]).map(|at| (16 * number + at + 1) as u8).collect()
     }
 
-    /// Explores all interleavings of a writer and a reader of two packets.
+    /// Explores all interleavings of a writer and a reader of two packets with different lengths and
+    /// contents.
     fn explored<R: ByteConsumer + 'static>(name: &str, reading: fn(ModelConsumer) -> R) -> usize {
         explore(name, Some(4), move || {
             let (mut port, mut reader) = packets_by(CAPACITY, reading);
@@ -193,9 +194,10 @@ mod model_tests {
         })
     }
 
-    /// In every interleaving packets are read whole and in order, and each is either taken or refused.
+    /// In every interleaving the reader reads packets whole and in order. A packet is either read or was
+    /// refused by the ring.
     #[test]
-    fn packets_are_taken_whole_or_not_at_all() {
+    fn packets_are_read_whole_or_refused() {
         let executions = explored("header then body in the loop's ring", |consumer| consumer);
         assert!(executions > 50, "{executions}");
     }

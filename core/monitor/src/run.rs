@@ -33,7 +33,8 @@ use headrace_sensor::device::SensorInfo;
 use headrace_sensor::device_clock::ClockReport;
 use headrace_vehicle::Mission;
 
-/// Number of sections judged per batch at the end of a dive, before their notices are delivered.
+/// Number of sections judged per batch at the end of a dive. The notices of a batch are delivered before the
+/// next batch.
 const FINISHED_AT_ONCE: usize = 256;
 
 /// Data for judging at the end of a dive.
@@ -47,7 +48,8 @@ type AtEnd<'w> = (
     ResMut<'w, AlertList>,
 );
 
-/// A running loop. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
+/// A running loop. All of its memory is allocated; a tick takes no lock, makes no system call and formats no
+/// text.
 pub struct Loop {
     pub(super) world: World,
     schedule: Schedule,
@@ -57,7 +59,7 @@ pub struct Loop {
     mission: Mission,
     ticks: u64,
     finished: bool,
-    /// Whether a plugin has systems in the stages that place pings.
+    /// Whether a plugin has systems in the stages that georeference pings.
     pub(super) has_own_placing: bool,
 }
 
@@ -69,7 +71,7 @@ impl Loop {
         let (ticks, finished) = (0, false);
         let mut armed =
             Self { world, schedule, readers, ports, sources, mission, ticks, finished, has_own_placing };
-        // The first run of a schedule allocates. Without packets it has no other effect.
+        // The first run of a schedule allocates memory. Without packets the run has no other effect.
         armed.tick(MonoNs(0));
         armed.ticks = 0;
         armed
@@ -77,14 +79,14 @@ impl Loop {
 
     /// Processes the waiting packets. Returns the number of packets consumed.
     ///
-    /// `now` is the end of the tick's time. It is only recorded; no result depends on it.
+    /// `now` is the end of the tick's time. The loop only records it; no result depends on it.
     ///
     /// Allocates: never.
     pub fn tick(&mut self, now: MonoNs) -> usize {
         if let Some(mut time) = self.world.get_resource_mut::<TickTime>() {
             *time = TickTime { index: self.ticks, now };
         }
-        // Judgements at the end of a dive must not be cleared before they are published.
+        // After the end of a dive, the judgements made there must not be cleared before they are published.
         if !self.finished {
             self.world.resource_mut::<Digests>().next_tick();
         }
@@ -101,22 +103,24 @@ impl Loop {
         self.ticks += 1;
     }
 
-    /// The world and the readers of the rings, for splitting or joining.
+    /// The world, and the readers of the rings. [`crate::split`] uses them.
     pub(super) fn split_world(&mut self) -> (&mut World, &mut Vec<PortReader>) {
         (&mut self.world, &mut self.readers)
     }
 
-    /// Writing end of a source's ring, for a port's thread, a player or a simulator; `None` once taken.
+    /// Takes the writing end of a source's ring, for a port's thread, a player or a simulator.
+    ///
+    /// `None` if it was taken already.
     pub fn take_port(&mut self, source: usize) -> Option<Port> {
         self.ports.get_mut(source)?.take()
     }
 
-    /// Writing end of the operator's input; `None` once taken.
+    /// Takes the writing end of the operator's input. `None` if it was taken already.
     pub fn take_console(&mut self) -> Option<Port> {
         self.take_port(self.sources.len())
     }
 
-    /// Sources of the sensors, in the order of their ids. The operator's input comes after them.
+    /// Sources of the sensors, in the order of their ids. The operator's input is not among them.
     pub fn sources(&self) -> &[SourceInfo] {
         &self.sources
     }
@@ -153,7 +157,7 @@ impl Loop {
 
     /// Fix at `at`, which may be slightly before or after the last reading.
     ///
-    /// Errors: the reason for having no fix.
+    /// Errors: the reason for which there is no fix.
     pub fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
         self.of_vehicle::<Navigator>().navigation.fix(at)
     }
@@ -178,7 +182,7 @@ impl Loop {
         self.world.resource()
     }
 
-    /// Counts over the whole dive.
+    /// Counts of pings and packets over the whole dive.
     pub fn tally(&self) -> &Tally {
         self.world.resource()
     }
@@ -193,7 +197,7 @@ impl Loop {
         self.world.resource()
     }
 
-    /// All notes.
+    /// Notes of the dive.
     pub fn notes(&self) -> &Notes {
         self.world.resource()
     }
@@ -203,7 +207,7 @@ impl Loop {
         self.world.resource::<Console>().counts
     }
 
-    /// Properties of the dive that texts of alerts need.
+    /// Context for the texts of the dive's alerts.
     pub fn surroundings(&self) -> TextContext<'_> {
         TextContext::of(
             &self.sources,
@@ -213,7 +217,7 @@ impl Loop {
         )
     }
 
-    /// Live state with the alerts, as JSON.
+    /// Live state together with the alerts, as JSON.
     pub fn live_state_json(&self) -> LiveStateJson {
         self.live_state().json(&self.surroundings(), self.alert_list())
     }
@@ -261,7 +265,7 @@ impl Loop {
         vehicle.get().expect("the vehicle's components exist since arming")
     }
 
-    /// Outlook as of the last packet: where samples have landed and may still land.
+    /// Outlook as of the last packet: where samples have landed and where they may still land.
     pub(super) fn outlook(&self) -> Outlook {
         let at = self.tally().span.map_or(MonoNs(0), |(_, last)| last);
         self.coverage().frontier.outlook(self.of_sensors().filter_map(|reach: &HeadFrontier| reach.0), at)
@@ -269,7 +273,7 @@ impl Loop {
 
     /// Judges the unsettled sections at the end of a dive, when no more samples will come.
     ///
-    /// `hear` gets their notices in batches, with the loop's state at that point. All notices of a long dive
+    /// `hear` gets the notices in batches, with the loop's state after each batch. All notices of a long dive
     /// at once would take more memory than its samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         let vehicle = self.world.resource::<VehicleEntities>().vehicle;
@@ -291,7 +295,7 @@ impl Loop {
         }
     }
 
-    /// Sections to be judged at the end, and the fields that their requests share.
+    /// Sections to be judged at the end of a dive, and the fields common to all requests for them.
     fn open_requests(&mut self) -> (Vec<i64>, Option<Request>) {
         let outlook = self.outlook();
         let (mut open, mut common) = (Vec::new(), None);
@@ -328,10 +332,10 @@ impl Loop {
         }
     }
 
-    /// Snapshot of the state after the last tick. A loop of the same vehicle restored from it gives the same
-    /// results.
+    /// Snapshot of the state after the last tick.
     ///
-    /// It excludes packets waiting in the rings and plugins' private state.
+    /// A loop of the same vehicle gives the same results after it has restored the snapshot. The snapshot
+    /// excludes packets waiting in the rings, and private state of plugins.
     ///
     /// Errors: a part can't be serialised.
     pub fn save(&self) -> Result<Vec<u8>, SnapshotError> {
@@ -347,10 +351,11 @@ impl Loop {
         to.finish()
     }
 
-    /// Restores a snapshot saved by a loop of the same vehicle and program. Packets waiting in the rings are
-    /// dropped.
+    /// Restores a snapshot saved by a loop of the same vehicle and program.
     ///
-    /// Errors: the snapshot doesn't fit this loop, which must not be used afterwards.
+    /// Packets waiting in the rings are dropped.
+    ///
+    /// Errors: the snapshot doesn't fit this loop. The loop must not be used afterwards.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let mut from = Restorer::new(snapshot);
         if self.is_split() {
@@ -363,12 +368,12 @@ impl Loop {
         if from.is_empty() { Ok(()) } else { Err(from.unfit("it has extra bytes at its end".to_owned())) }
     }
 
-    /// Frees the samples' memory: after the end of a dive the report needs only the sections.
+    /// Frees the memory of the samples. After the end of a dive the report needs only the sections.
     pub fn release_samples(&mut self) {
         self.world.resource_mut::<Coverage>().store.release();
     }
 
-    /// Whether packets wait in the rings.
+    /// Whether packets are waiting in the rings.
     pub fn has_waiting(&self) -> bool {
         self.readers.iter().any(|reader| reader.peek().is_some())
     }

@@ -1,10 +1,10 @@
-//! Splits a loop into three parts for the threads of a replay: placing pings, advising, and the rest.
+//! Splits a loop into three parts for the threads of a replay: georeferencing pings, advising, and the rest.
 //!
-//! Results on the wall don't affect navigation, and the advice depends on situations only, so data flows in
-//! one direction. [`Placer::tick`] fills a [`PlacedTick`], [`Advising::advise`] makes its advice, and
-//! [`Loop::tick_placed`] does the rest of the tick. In the order of the ticks the results equal those of
-//! [`Loop::tick`] bit for bit, wherever each part runs. Several loops that differ only in target or sections
-//! can share one placer.
+//! Results on the wall don't affect navigation, and the advice depends on situations only. Data therefore
+//! flows in one direction. [`Placer::tick`] fills a [`PlacedTick`], [`Advising::advise`] computes its advice,
+//! and [`Loop::tick_placed`] does the rest of the tick. If the ticks stay in order, the results equal those
+//! of [`Loop::tick`] bit for bit, on whatever threads the parts run. Several loops that differ only in target
+//! or sections can share one placer.
 
 use bevy_ecs::component::{Component, Mutable};
 use bevy_ecs::entity::Entity;
@@ -31,28 +31,29 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::advice::Advice;
 
-/// Lists with which a split loop was armed. They have room for any tick, and are kept until the loop is
-/// joined.
+/// Lists that the loop had before it was split. They have room for any tick, and go back into the loop when
+/// it is joined.
 #[derive(Debug, Resource)]
 struct KeptLists {
     lists: Lists,
     advice: Vec<Advice>,
 }
 
-/// Part from packets to placed pings: decoders, navigation, and motion of the heads.
+/// Part from packets to georeferenced pings: decoders, navigation, and motion of the heads.
 pub struct Placer {
     world: World,
     schedule: Schedule,
     readers: Vec<PortReader>,
 }
 
-/// Part that advises.
+/// Part that computes the advice.
 pub struct Advising {
     advisor: Advisor,
 }
 
-/// Data of a tick that later stages need from earlier ones. Its lists are reused from tick to tick, and grow
-/// as needed.
+/// Data that the later stages of a tick need from the earlier ones.
+///
+/// The lists are reused from tick to tick, and grow as needed.
 #[derive(Debug)]
 pub struct PlacedTick {
     now: MonoNs,
@@ -66,7 +67,7 @@ pub struct PlacedTick {
     health: Vec<SensorHealth>,
 }
 
-/// Lists that stages fill and later stages read.
+/// Lists that early stages fill and later stages read.
 #[derive(Debug, Default)]
 struct Lists {
     events: Vec<Event>,
@@ -110,7 +111,7 @@ impl Default for PlacedTick {
 }
 
 impl Placer {
-    /// Processes the waiting packets up to placed pings. `now` is the end of the tick's time.
+    /// Processes the waiting packets up to georeferenced pings. `now` is the end of the tick's time.
     pub fn tick(&mut self, now: MonoNs, into: &mut PlacedTick) {
         let Self { world, schedule, readers } = self;
         world.resource_mut::<Digests>().next_tick();
@@ -122,7 +123,7 @@ impl Placer {
         core::mem::swap(&mut world.resource_mut::<PositionedList>().0, &mut into.lists.positioned);
         core::mem::swap(&mut world.resource_mut::<PlacedList>().0, &mut into.lists.placed);
         core::mem::swap(&mut world.resource_mut::<PlacedEvents>().0, &mut into.lists.of_events);
-        // The capacity of this list limits a tick's commands, so it is kept.
+        // The commands are copied, since the capacity of the world's list limits the commands of a tick.
         into.commands.clone_from(&world.resource::<Commands>().0);
         into.tally = *world.resource::<Tally>();
         let counts = world.resource::<Console>().counts;
@@ -134,14 +135,14 @@ impl Placer {
         into.health.extend(entities.by_source.iter().filter_map(|sensor| world.get::<SensorHealth>(*sensor)));
     }
 
-    /// Whether packets wait in the rings.
+    /// Whether packets are waiting in the rings.
     pub fn has_waiting(&self) -> bool {
         self.readers.iter().any(|reader| reader.peek().is_some())
     }
 
-    /// Copies the state of another loop's placer, with the same sensors and navigation.
+    /// Copies the state of another loop's placer.
     ///
-    /// Errors: the other placer has other sensors or another navigation. This one must not be used
+    /// Errors: the other placer has other sensors or another navigation. This placer must not be used
     /// afterwards.
     pub fn take_over(&mut self, other: &Self) -> Result<(), SnapshotError> {
         let mut to = Saver::default();
@@ -173,13 +174,13 @@ impl Placer {
     }
 }
 
-/// Functions that save and restore a kind of component of a [`Placer`].
+/// Functions that save and restore the components of one type in a [`Placer`].
 struct PlacerState {
     save: fn(&World, &mut Saver),
     restore: fn(&mut World, &mut Restorer<'_>) -> Result<(), SnapshotError>,
 }
 
-/// State that [`Loop::join`] takes back, except the readings' speed of sound.
+/// State that [`Loop::join`] takes back. The speed of sound of the readings is handled separately.
 const STATE: [PlacerState; 6] = [
     PlacerState { save: Placer::state_of::<Navigator>, restore: Placer::restore_of::<Navigator> },
     PlacerState { save: Placer::state_of::<SensorDecoder>, restore: Placer::restore_of::<SensorDecoder> },
@@ -203,9 +204,9 @@ impl Advising {
 impl Loop {
     /// Splits off parts of this loop for other threads, until [`Loop::join`] puts them back.
     ///
-    /// `None` if a plugin has systems in a stage that places pings, or if the loop is already split. While it
-    /// is split, [`Loop::tick_placed`] replaces [`Loop::tick`] and the loop can't be saved. The state of
-    /// decoders and navigation beyond the last tick's results is elsewhere: [`Loop::fix`] and
+    /// Returns `None` if a plugin has systems in a stage that georeferences pings, or if the loop is already
+    /// split. While the loop is split, [`Loop::tick_placed`] replaces [`Loop::tick`], and the loop can't be
+    /// saved. The placer then has the state of decoders and navigation, so [`Loop::fix`] and
     /// [`Loop::consistency`] panic.
     pub fn split(&mut self) -> Option<(Placer, Advising)> {
         if self.is_split() || self.has_own_placing {
@@ -229,16 +230,16 @@ impl Loop {
         self.resource::<PlacedElsewhere>().is_some()
     }
 
-    /// Runs the later stages of a tick with its advice.
+    /// Runs the later stages of a tick with the tick's advice.
     ///
-    /// Returns false if a lagging outlet holds the tick's packets back. This call was then a tick without
-    /// packets; try the same tick again a little later.
+    /// Returns false if a lagging outlet holds back the tick's packets. The call then counts as a tick
+    /// without packets. Pass the same tick again a little later.
     pub fn tick_placed(&mut self, tick: &PlacedTick, advice: &[Advice]) -> bool {
         self.tick_with(tick, &mut |world| tick.lists.copy_to(world, advice))
     }
 
-    /// Runs the later stages of a tick that no other loop needs: its lists are swapped with those of the last
-    /// tick.
+    /// Runs the later stages of a tick that no other loop needs. The tick's lists are swapped with those of
+    /// the previous tick.
     pub fn tick_taken(&mut self, tick: &mut PlacedTick, advice: &mut Vec<Advice>) -> bool {
         let mut lists = core::mem::take(&mut tick.lists);
         let is_taken = self.tick_with(tick, &mut |world| lists.swap(world, advice));
@@ -267,7 +268,7 @@ impl Loop {
         is_taken
     }
 
-    /// Puts the parts back after the last tick that they have processed.
+    /// Puts the parts back into the loop, after the last tick that they have processed.
     pub fn join(&mut self, placer: Placer, advising: Advising) {
         let Placer { world: mut placing, readers, .. } = placer;
         let (world, own) = self.split_world();
@@ -331,7 +332,7 @@ fn placing_world(world: &mut World) -> World {
     placing
 }
 
-/// Copies the counts and other small data of a tick's earlier stages.
+/// Copies the counts and other small data of a tick's earlier stages into the world.
 fn hand_over(world: &mut World, tick: &PlacedTick) {
     refill(&mut world.resource_mut::<Commands>().0, &tick.commands);
     let mut tally = world.resource_mut::<Tally>();

@@ -5,7 +5,8 @@ use bevy_ecs::schedule::{
     IntoScheduleConfigs, LogLevel, Schedule, ScheduleBuildSettings, SingleThreadedExecutor, SystemSet,
 };
 
-/// A stage of the tick. Systems of one stage see all results of earlier stages for the tick's packets.
+/// A stage of a tick. Systems of a stage see all results that earlier stages have computed from the tick's
+/// packets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum Stage {
     /// Converts bytes to readings.
@@ -36,7 +37,8 @@ impl Stage {
         Self::Publish,
     ];
 
-    /// Whether it is one of the stages that place pings, which a replay may run on another thread.
+    /// Whether the stage georeferences pings or prepares that. A replay may run these stages on another
+    /// thread.
     pub(super) fn is_placing(self) -> bool {
         matches!(self, Self::Decode | Self::Navigate | Self::Georeference)
     }
@@ -47,11 +49,11 @@ impl Stage {
     }
 }
 
-/// Marks that the stages that place pings run elsewhere: their lists come with the tick.
+/// Marks a world whose pings are georeferenced elsewhere. The lists of these stages come with each tick.
 #[derive(Debug, Resource)]
 pub(super) struct PlacedElsewhere;
 
-/// Set of the stages that place pings.
+/// Set of the stages up to georeferencing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 struct Placing;
 

@@ -1,4 +1,4 @@
-//! An unsure stretch and its texts. Allocates: for outlets, not for a tick.
+//! An unsure stretch and its texts. Allocates: outlets only, never within a tick.
 
 use serde::Serialize;
 
@@ -13,7 +13,7 @@ pub struct UnsureStretch {
     pub from_m: f64,
     /// End, m.
     pub to_m: f64,
-    /// Metres of it that are unsure.
+    /// Metres of the stretch that are unsure.
     pub metres_m: f64,
     /// Largest hole, m.
     pub hole_m: f64,
@@ -21,21 +21,22 @@ pub struct UnsureStretch {
     pub hole_sd_m: f64,
     /// Error of that hole: the confidence times its standard deviation, m.
     pub hole_error_m: f64,
-    /// Driving figures of the section with that hole.
+    /// Driving figures of the section with the largest hole.
     #[serde(skip)]
     pub driven: Driven,
-    /// The error matters more than the hole in most of its sections.
+    /// Whether the error matters more than the hole in most sections of the stretch.
     #[serde(skip)]
     pub is_mostly_error: bool,
 }
 
 impl UnsureStretch {
-    /// Creates it from a stretch of sections.
+    /// Creates an unsure stretch from a stretch of sections.
     pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
         Self::from_sections(stretch, sections.section_m(), sections.confidence_sd())
     }
 
-    /// Creates it with the length of a section, m, and the confidence, standard deviations.
+    /// Creates an unsure stretch. `section_m` is the length of a section, m, and `confidence_sd` a number of
+    /// standard deviations.
     pub(super) fn from_sections(stretch: &Stretch, section_m: f64, confidence_sd: f64) -> Self {
         let [hole_m, hole_sd_m] = stretch.largest().hole_m;
         Self {
@@ -68,7 +69,7 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
     }
 }
 
-/// Ratios to the fitting speed between which a speed counts as equal to it.
+/// Ratios to the fitting speed. A speed between them counts as equal to the fitting speed.
 const AS_FITS: [f64; 2] = [0.98, 1.02];
 
 /// Text of the remedy; empty if there is none.
@@ -86,7 +87,7 @@ pub fn helps_text(stretch: &UnsureStretch) -> String {
             } else if fits_mps > 0.0 && speed_mps > most_mps {
                 format!("at most {fits_mps:.2} m/s, or {surer}")
             } else if speed_mps > 0.0 && speed_mps < least_mps && is_uneven {
-                // Slower than that, heads apart along the hull are out of phase.
+                // Below this speed, heads apart along the hull are out of phase.
                 format!("at {fits_mps:.2} m/s, or {surer}")
             } else {
                 surer.to_owned()

@@ -1,9 +1,9 @@
-//! Recordings of voice notes: limits and formats. The loop has only the notes; recordings go from the page
-//! straight to the log.
+//! Recordings of voice notes: limits and formats. The loop has only the notes. The recordings go straight
+//! from the page to the log.
 
 /// Longest recording, seconds.
 pub const MAX_VOICE_S: u32 = 60;
-/// Longest recording, bytes. At 24 kbit/s a minute takes 180 kB.
+/// Maximum size of a recording, bytes. A minute at 24 kbit/s takes 180 kB.
 pub const MAX_VOICE_BYTES: usize = 512 << 10;
 
 /// Container of a recording. Browsers record Opus in WebM or Ogg, or AAC in MP4.
@@ -37,7 +37,7 @@ impl Container {
         }
     }
 
-    /// Extension of its files.
+    /// Extension of the container's files.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Webm => "webm",
@@ -46,7 +46,7 @@ impl Container {
         }
     }
 
-    /// Whether bytes begin like such a file.
+    /// Whether bytes begin like a file of this container.
     ///
     /// Source: RFC 8794 section 11.2 (EBML), RFC 3533 section 6, ISO/IEC 14496-12 section 4.3.
     pub fn holds(self, bytes: &[u8]) -> bool {
@@ -67,7 +67,7 @@ pub struct Voice {
     pub seconds: u32,
     /// Container of the audio.
     pub container: Container,
-    /// Contents of the file.
+    /// Contents of the audio file.
     pub audio: Vec<u8>,
 }
 
@@ -78,10 +78,10 @@ pub enum VoiceError {
     /// The id is 0.
     #[error("a voice note has the id 0; expected 1 to 4294967295")]
     Id,
-    /// It is too long or too short.
+    /// The recording is too long or too short.
     #[error("a voice note of {0} s; expected 1 to {MAX_VOICE_S} s")]
     Seconds(u32),
-    /// It is too large.
+    /// The recording is too large.
     #[error("a voice note of {0} bytes; at most {MAX_VOICE_BYTES} bytes are allowed")]
     Bytes(usize),
     /// The media type isn't allowed.
@@ -93,7 +93,7 @@ pub enum VoiceError {
 }
 
 impl Voice {
-    /// Checks it against the limits of a recording.
+    /// Checks the recording against the limits.
     ///
     /// Errors: the first violation.
     pub fn checked(self) -> Result<Self, VoiceError> {
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn only_browser_recordings_are_accepted() {
+    fn only_recordings_in_allowed_containers_are_accepted() {
         for (text, container) in [
             ("audio/webm;codecs=opus", Some(Container::Webm)),
             (" Audio/OGG ; codecs=opus", Some(Container::Ogg)),
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn violated_limit_is_named() {
+    fn error_names_the_violated_limit() {
         assert!(voice(b"OggS and so on").checked().is_ok());
         assert_eq!(Voice { id: 0, ..voice(b"OggS") }.checked(), Err(VoiceError::Id));
         assert_eq!(Voice { seconds: 61, ..voice(b"OggS") }.checked(), Err(VoiceError::Seconds(61)));

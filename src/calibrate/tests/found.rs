@@ -1,4 +1,4 @@
-//! Compares estimates with the simulated errors.
+//! Compares the estimates with the errors of the simulated vehicle.
 
 use super::super::estimate::NotEstimated;
 use super::super::heads::{Heads, heads};
@@ -14,7 +14,7 @@ fn found(stand: &Stand) -> Heads {
     stand.ask(|material| heads(material).unwrap())
 }
 
-/// Two heads, of which one is turned and moved against the file, and sometimes mirrored.
+/// Mount errors of two heads. One head is turned and moved against the file, and for some seeds mirrored.
 fn wrong(seed: u64) -> [Wrong; 2] {
     let swing = math::sin(seed as f64);
     [
@@ -28,11 +28,12 @@ fn wrong(seed: u64) -> [Wrong; 2] {
     ]
 }
 
-/// Angles, relative positions and senses of rotation are within three of the stated standard deviations.
+/// Angles, relative positions and senses of rotation are correct within three of the stated standard
+/// deviations.
 ///
-/// Those are as small as a survey needs.
+/// The standard deviations are as small as a survey needs.
 #[test]
-fn injected_offsets_are_found() {
+fn injected_mount_errors_are_estimated() {
     let mut worst = (0.0_f64, 0.0_f64);
     for (name, profile) in profiles() {
         for seed in 1..=20 {
@@ -68,9 +69,9 @@ fn injected_offsets_are_found() {
     println!("worst error {:.2} sigma, widest sigma {:.2} of what a survey needs", worst.0, worst.1);
 }
 
-/// The estimated mount points where the head points.
+/// The beams of the estimated mount point in the directions of the true beams.
 #[test]
-fn estimated_mount_points_like_the_true_head() {
+fn estimated_mount_has_the_beam_directions_of_the_true_head() {
     let (_, profile) = profiles().into_iter().next().unwrap();
     let wrong = [Wrong { angle_deg: 7.0, is_mirrored: true, ..Wrong::default() }, Wrong::default()];
     let head = found(&Stand::new(profile, &wrong, 3)).heads[0];
@@ -83,13 +84,14 @@ fn estimated_mount_points_like_the_true_head() {
 }
 
 #[test]
-fn mirrored_world_gives_mirrored_offsets() {
+fn mirrored_tunnel_gives_mirrored_estimates() {
     for (name, profile) in profiles() {
-        // Without noise, which isn't mirrored.
+        // There is no noise, because the noise isn't mirrored.
         let wrong =
             [Wrong { angle_deg: 3.0, left_m: 0.02, up_m: 0.01, is_mirrored: false }, Wrong::default()];
         let stand = Stand { noise_m: 0.0, ..Stand::new(profile, &wrong, 5) };
-        // The second head is to the left of the first one. In the mirror it would be to the right.
+        // Only the first head is used. The second one is to its left, and would be to its right in the
+        // mirror.
         let stand = Stand { wrong: stand.wrong[..1].to_vec(), ..stand };
         let (here, there) = (found(&stand), found(&mirrored(&stand)));
         let [a, b] = [&here, &there].map(|found| found.heads[0].angle_rad.unwrap());
@@ -111,10 +113,10 @@ fn echosounders_reveal_upside_down_heads() {
     }
 }
 
-/// The zeros of cable counter, surface and water level are exact except for quantisation and the height by
+/// The zeros of cable counter, surface and water level are exact, apart from quantisation and the height from
 /// the heads.
 #[test]
-fn zeros_are_exact() {
+fn zeros_of_counter_surface_and_level_are_exact() {
     let mut stand = Stand { noise_m: 0.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default(); 2], 1) };
     // The sensor is slightly under water.
     stand.site.surface_above_floor_m = 2.6;
@@ -132,7 +134,7 @@ fn zeros_are_exact() {
         let heads = heads(material).unwrap();
         let level = zero::water_level(material, &heads, None).unwrap();
         assert!((level.found.value - stand.site.surface_above_floor_m).abs() < 0.01, "{level:?}");
-        // A surface pressure 1000 Pa lower puts the surface 10 cm higher.
+        // A surface pressure lower by 1000 Pa puts the surface 10 cm higher.
         let pa = stand.site.surface_pressure_pa - 1000.0;
         let higher = zero::water_level(material, &heads, Some(pa)).unwrap();
         assert!((higher.found.value - level.found.value - 0.102).abs() < 1e-3);
@@ -143,7 +145,8 @@ fn zeros_are_exact() {
     });
 }
 
-/// More turns see the same roughness. Their weights are shared, so no piece of wall counts more than once.
+/// Further turns see the same roughness of the wall. Their returns share the weight, so each piece of wall
+/// counts once.
 #[test]
 fn each_piece_of_wall_counts_once() {
     let stand = Stand { seconds: 100, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };

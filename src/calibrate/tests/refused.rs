@@ -1,4 +1,4 @@
-//! Quantities that can't be estimated, and the reasons.
+//! Checks which quantities are refused, and the reasons.
 
 use super::super::estimate::NotEstimated;
 use super::super::heads::heads;
@@ -31,23 +31,23 @@ fn moving_vehicle_is_refused() {
 }
 
 #[test]
-fn head_that_sees_little_wall_is_refused() {
+fn head_that_sees_too_little_wall_is_refused() {
     let stand = Stand { sector_deg: 90.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };
     let why = why(&stand).to_string();
     assert!(why.starts_with("no full turn: the head covered only 9"), "{why}");
 }
 
-/// Section and returns are symmetric. Without echosounders, or from the centre, the sides can't be
-/// distinguished.
+/// Section and returns are symmetric. The two sides can't be distinguished without echosounders, or if the
+/// vehicle is in the centre.
 #[test]
-fn sense_of_rotation_in_a_symmetric_section_needs_the_side() {
+fn sense_of_rotation_in_a_symmetric_section_needs_echosounders_off_the_centre() {
     let wrong = [Wrong::default(); 2];
     for (at, has_echoes, told) in
         [([0.6, 2.3], true, true), ([0.6, 2.3], false, false), ([0.0, 2.3], true, false)]
     {
         for (name, profile) in profiles() {
             let stand = Stand::new(profile, &wrong, 4);
-            // A single head; two side by side would be enough without echosounders.
+            // There is one head only. With two heads side by side, no echosounders would be needed.
             let stand = Stand { at, has_echoes, wrong: vec![Wrong::default()], ..stand };
             let found = stand.ask(|material| heads(material).unwrap());
             let of = found.heads[0].is_mirrored;
@@ -59,7 +59,7 @@ fn sense_of_rotation_in_a_symmetric_section_needs_the_side() {
 }
 
 #[test]
-fn other_wall_contradicts_the_profile() {
+fn wall_of_another_shape_contradicts_the_profile() {
     let stand = Stand::new(shapes::rectangle(6.0, 5.0).unwrap(), &[Wrong::default(); 2], 1);
     let other = shapes::circle(3.6).unwrap();
     let why = stand.ask(|material| {
@@ -69,7 +69,7 @@ fn other_wall_contradicts_the_profile() {
 }
 
 #[test]
-fn missing_reading_is_named() {
+fn refusal_names_the_missing_readings() {
     let stand = Stand::new(shapes::ceran().unwrap(), &[], 1);
     assert_eq!(why(&stand), NotEstimated::Missing { what: "any profiling head" });
     let nothing = Stand { seconds: 0, ..stand };

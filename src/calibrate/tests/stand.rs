@@ -20,7 +20,8 @@ const ECHOES: usize = 3;
 pub(super) const HEADS: usize = 7;
 const DEVICE_MPS: f64 = 1500.0;
 
-/// True mount of a head against its file: degrees about its axis, m to the left and up, and whether it is mirrored.
+/// True mount of a head relative to its file: degrees about its axis, m to the left and up, and whether it is
+/// mirrored.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Wrong {
     pub(super) angle_deg: f64,
@@ -29,18 +30,18 @@ pub(super) struct Wrong {
     pub(super) is_mirrored: bool,
 }
 
-/// A stand; see the module's description.
+/// A simulated vehicle at rest, with its tunnel and sensors.
 pub(super) struct Stand {
     pub(super) profile: Profile,
     pub(super) site: Site,
     pub(super) settings: Settings,
     pub(super) wrong: Vec<Wrong>,
-    /// y and z, m, and roll, pitch, yaw, degrees.
+    /// Position y and z, m. Below: roll, pitch and yaw, degrees.
     pub(super) at: [f64; 2],
     pub(super) turned_deg: [f64; 3],
     pub(super) speed_mps: f64,
     pub(super) seconds: u32,
-    /// Sector of the heads, degrees.
+    /// Sector that the heads sweep, degrees.
     pub(super) sector_deg: f64,
     pub(super) noise_m: f64,
     pub(super) outliers: f64,
@@ -57,12 +58,12 @@ pub(super) fn profiles() -> [(&'static str, Profile); 3] {
 }
 
 impl Stand {
-    /// 12 s in which each head turns once, 0.6 m beside the axis.
+    /// A vehicle 0.6 m beside the axis, for 12 s in which each head turns once.
     pub(super) fn new(profile: Profile, wrong: &[Wrong], seed: u64) -> Self {
         Self {
             profile,
             site: Site { axis_yaw_rad: 0.7, ..Site::default() },
-            // Narrow beams, equivalent to a ray.
+            // The beams are so narrow that each is equivalent to a ray.
             settings: Settings { return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() },
             wrong: wrong.to_vec(),
             at: [0.6, 2.3],
@@ -91,7 +92,8 @@ impl Stand {
             4 => (at(0.1, -0.2, 0.0, 0.0, -FRAC_PI_2), echo),
             5 => (at(0.1, 0.0, -0.1, FRAC_PI_2, 0.0), echo),
             6 => (at(0.1, 0.0, 0.1, -FRAC_PI_2, 0.0), echo),
-            // Close together, so that the vehicle's heading can't hide their offsets.
+            // The heads are close together, so that an error of the vehicle's heading can't hide their
+            // offsets.
             head => (at(0.4, 0.3 * (head - HEADS) as f64, 0.0, 0.0, 0.0), SensorKind::Head),
         };
         SensorInfo { mount, kind }
@@ -101,7 +103,7 @@ impl Stand {
         (0..HEADS + self.wrong.len()).map(Self::filed).collect()
     }
 
-    /// Passes its readings to `estimate`.
+    /// Passes the stand's readings to `estimate`.
     pub(super) fn ask<T>(&self, estimate: impl FnOnce(&Material<'_>) -> T) -> T {
         let (sensors, events) = (self.sensors(), self.events());
         let Self { profile, site, settings, .. } = self;
@@ -111,7 +113,7 @@ impl Stand {
     }
 
     fn uniform(&self, k: u64, salt: u64) -> f64 {
-        // A hashed counter (splitmix64).
+        // Splitmix64 of a counter.
         let mut z = (self.seed << 40) ^ (salt << 32) ^ k;
         for _ in 0..2 {
             z = z.wrapping_add(0x9E37_79B9_7F4A_7C15);
@@ -197,7 +199,7 @@ impl Stand {
     }
 }
 
-/// The mirror image: left is right.
+/// The stand's mirror image, with left and right exchanged.
 pub(super) fn mirrored(stand: &Stand) -> Stand {
     let [roll, pitch, yaw] = stand.turned_deg;
     let wrong = stand.wrong.iter().map(|wrong| Wrong {

@@ -1,4 +1,4 @@
-//! Text and JSON for a machine simulated by files.
+//! Checks text and JSON for a machine that is simulated by files.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
@@ -12,7 +12,9 @@ use serde_json::json;
 
 use super::*;
 
-/// A simulated machine's files in a temporary folder, removed on drop; all belong to root and dialout there.
+/// Files of a simulated machine in a temporary folder, which is removed on drop.
+///
+/// On that machine all files belong to the user root and the group dialout.
 struct Tree(PathBuf);
 
 impl Drop for Tree {
@@ -23,7 +25,7 @@ impl Drop for Tree {
 
 impl Tree {
     fn new(name: &str) -> Self {
-        // Two tests may build the same machine at once.
+        // Two tests may build a machine of the same name at the same time.
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let (process, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let tree = Self(std::env::temp_dir().join(format!("headrace-devices-{name}-{process}-{count}")));
@@ -51,7 +53,8 @@ impl Tree {
         symlink(to, at).unwrap();
     }
 
-    /// An adapter with an echosounder, a counter that only root may open, an adapter that is down, a bus without files.
+    /// A machine with an adapter with an echosounder, a counter that only root may open, an adapter that is
+    /// down, and a bus without files.
     fn vehicle() -> Self {
         let tree = Self::new("vehicle");
         let usb = "/sys/devices/usb1/1-1";
@@ -180,7 +183,7 @@ fn empty_machine_is_reported_as_empty() {
 }
 
 #[test]
-fn sensor_without_a_ready_port_fails_the_command() {
+fn exit_code_is_1_while_a_sensor_has_no_ready_port() {
     let mut inventory = inventory();
     assert_eq!(inventory.exit_code(), 1);
     let shown = inventory.json();

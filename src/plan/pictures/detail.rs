@@ -1,4 +1,4 @@
-//! Detail of the pattern, to scale, around its largest gap.
+//! Detail of the sampling pattern around its largest gap, to scale.
 
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart, short};
@@ -9,23 +9,23 @@ use headrace_pictures::polyline::Px;
 
 use super::laid::Laid;
 
-/// Colour inside the circle.
+/// Fill colour of the circle of diameter T.
 pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
 /// Position of the caption, pixels.
 const WORDS: Px = [634.0, 348.0];
 /// Distance below which samples share one marker, pixels.
 const APART_PX: f64 = 4.0;
-/// Number of samples above which single ones can't be distinguished.
+/// Number of samples above which single samples can't be distinguished.
 const MOST: usize = 450;
-/// Half the width of the detail as a multiple of T.
+/// Half the width of the detail, as a multiple of T.
 const HALF: f64 = 1.5;
 
 struct Detail<'c> {
     chart: Chart<'c>,
     laid: &'c Laid,
     centre: [f64; 2],
-    /// Origin of x, m.
+    /// Chainage at the left edge, m.
     from_m: f64,
     half_m: f64,
 }
@@ -61,7 +61,7 @@ fn words(canvas: &Canvas, t_m: f64) {
 }
 
 impl Detail<'_> {
-    /// The heads' tracks, and their images across the seam on either side.
+    /// Draws the heads' tracks. They are repeated on either side of the seam.
     fn lines(&self, dense: bool) {
         for pass in self.laid.passes().into_iter().filter(|pass| !(dense && pass.hidden)) {
             let thin = Look { width_px: 0.8, dash: &[], ..look::of_several(pass.head) };
@@ -73,7 +73,7 @@ impl Detail<'_> {
         }
     }
 
-    /// Samples that aren't hidden, by head, in sheet coordinates.
+    /// Samples that aren't hidden, each with its head and its place on the sheet.
     fn samples(&self) -> Vec<(usize, Px)> {
         let mut places: Vec<(usize, Px)> = Vec::new();
         for (sample, at) in self.laid.near(self.centre, [self.half_m; 2]) {

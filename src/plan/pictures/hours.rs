@@ -1,4 +1,4 @@
-//! Hours against T.
+//! Chart of hours against T.
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart, short};
@@ -12,21 +12,21 @@ use super::Shown;
 use super::modes::{self, Mode};
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
-/// Ratio of successive speeds on a curve.
+/// Ratio of successive speeds along a curve.
 const FASTER: f64 = 1.02;
-/// Number of points at which the fastest mode is found.
+/// Number of points at which the fastest mode is determined.
 const LEAST: u32 = 300;
-/// Band under the mode that takes the least time.
+/// Style of the band under the mode that takes the least time.
 const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::T };
 
-/// The T of interest, with the hours that every mode takes for it.
+/// The T that the chart marks, and the hours that every mode takes for it.
 struct Sought {
     t_m: f64,
     /// Hours, by mode.
     hours: Vec<Option<f64>>,
 }
 
-/// Hours for the whole length, one way, against T for every mode.
+/// Draws the hours for the whole length, one way, against T, for every mode.
 pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let sought = sought(shown, &modes)?;
@@ -45,7 +45,7 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     Ok(canvas.into_svg())
 }
 
-/// Draws everything, if some mode gives a T.
+/// Draws all curves and marks, if any mode gives a T.
 fn curves(
     chart: &Chart<'_>,
     shown: &Shown<'_>,
@@ -66,20 +66,20 @@ fn curves(
     Ok(())
 }
 
-/// The target, or else the T at the requested speed.
+/// T that the chart marks: the target, or else the T at the requested speed.
 fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let t_m = match shown.question.target_m {
         Some(target_m) => target_m,
         None => shown.planner.t_max_m(shown.mode, shown.asked_mps().unwrap_or(shown.speed_mps))?,
     };
-    // Dummy axis, for text in place of curves.
+    // Without a T, the chart has text in place of curves, and any axis will do.
     let t_m = if t_m.is_finite() { t_m } else { 1.0 };
     let hours = |mode: &Mode| Some(length_m / shown.planner.v_max_mps(mode.number, t_m).ok()? / 3600.0);
     Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
 }
 
-/// Ends of the x and y axes.
+/// Upper ends of the x and y axes.
 fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let all = || sought.hours.iter().flatten().copied();
@@ -89,7 +89,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     if most_h > 0.0 {
         return Ok([2.2 * sought.t_m, (1.15 * most_h).min(4.0 * least_h).max(1.3 * asked_h)]);
     }
-    // No mode meets the target: the largest T of any mode at the speed shown.
+    // If no mode meets the target, the x axis extends to the largest T of any mode at the speed shown.
     let mut reached_m = 0.0_f64;
     for mode in modes.iter().filter(|mode| !mode.blind) {
         reached_m = reached_m.max(shown.planner.t_max_m(mode.number, shown.speed_mps)?);
@@ -97,7 +97,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     Ok([(1.3 * reached_m).max(2.2 * sought.t_m), (3.0 * shown_h).max(1.3 * asked_h)])
 }
 
-/// Legend of the band.
+/// Draws the legend of the band.
 fn legend(chart: &Chart<'_>) {
     let [x, y] = [FRAME.right - 10.0, FRAME.top + 12.0];
     chart.canvas.line(&[[x - 40.0, y], [x, y]], &BAND);
@@ -105,7 +105,7 @@ fn legend(chart: &Chart<'_>) {
 }
 
 fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<Vec<[f64; 2]>, SamplingError> {
-    /// Number of points of a curve: enough for a speed to grow a thousandfold.
+    /// Number of points of a curve. It is enough for the speed to increase a thousandfold.
     const POINTS: u32 = 400;
     let length_m = shown.planner.inspection().length_m;
     let mut v_mps = length_m / (1.02 * most_h * 3600.0);
@@ -133,8 +133,8 @@ fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
     (1..=LEAST).filter_map(point).collect()
 }
 
-/// Draws the target, or the T found, as a vertical line, and the requested time as a horizontal one. Returns
-/// its label.
+/// Draws the marked T as a vertical line, and the requested time as a horizontal one. Returns the label of
+/// the time.
 fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Option<Label> {
     chart.upright(sought.t_m, &look::TARGET);
     if let Some(asked_mps) = shown.asked_mps() {
@@ -164,7 +164,8 @@ fn label(chart: &Chart<'_>, mode: &Mode, end: Option<[f64; 2]>, hours: Option<f6
     Label { place, lines: vec![words], look: mode.look, bold: true }
 }
 
-/// Draws markers where curves meet the target; that of the fastest mode filled, with its hours and speed.
+/// Draws markers where curves meet the target. The marker of the fastest mode is filled and has its hours and
+/// speed.
 fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) {
     let Sought { t_m, hours } = sought;
     let found = modes.iter().filter_map(|mode| Some((mode, (*hours.get(mode.number)?)?)));

@@ -1,4 +1,4 @@
-//! The sampling pattern on the wall, and the range of chainage that all heads have passed.
+//! Computes the sampling pattern on the wall, and the chainages that all heads have passed.
 
 use headrace_geometry::math;
 use headrace_pictures::polyline;
@@ -15,16 +15,16 @@ pub(super) struct Laid {
     pub(super) samples: Vec<PatternSample>,
     pub(super) heads: usize,
     pub(super) perimeter_m: f64,
-    /// Travel per turn, m.
+    /// Distance that the vehicle moves in a turn of a head, m.
     pub(super) pitch_m: f64,
-    /// T at this speed, m; `None` if no head sees some strip.
+    /// T at this speed, m; `None` if there is a strip that no head sees.
     pub(super) t_m: Option<f64>,
-    /// Start of the chainage that all heads have passed, m.
+    /// Beginning of the chainages that all heads have passed, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
 }
 
-/// A piece of a head's track on the wall; drawn as one line.
+/// A piece of a head's track on the wall. It is drawn as one line.
 pub(super) struct Pass {
     pub(super) head: usize,
     pub(super) hidden: bool,
@@ -32,7 +32,7 @@ pub(super) struct Pass {
     pub(super) points: Vec<[f64; 2]>,
 }
 
-/// Computes enough turns for the chart and its detail.
+/// Computes the pattern, with enough turns for the chart and its detail.
 pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let planner = shown.planner;
     let specs = planner.specs(shown.mode);
@@ -41,7 +41,7 @@ pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let t_m = Some(planner.t_max_m(shown.mode, shown.speed_mps)?).filter(|t_m| t_m.is_finite());
     let places = || specs.iter().map(|spec| spec.mount.position.x());
     let apart_m = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
-    // A turn in which to search for the largest gap, and the detail around it.
+    // Length for a whole turn in which the largest gap is searched for, plus the detail around the gap.
     let wanted_m = (turns_shown(specs.len()) * pitch_m).max(pitch_m + 3.2 * t_m.unwrap_or(0.0));
     let steps = turn.map_or(1.0, |turn| f64::from(turn.steps())) * specs.len().max(1) as f64;
     let turns = ((wanted_m + apart_m.max(0.0)) / pitch_m + 1.0).min(MOST_SAMPLES / steps).max(2.0);
@@ -51,7 +51,7 @@ pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     Ok(Laid { samples, heads: specs.len(), perimeter_m, pitch_m, t_m, from_m, to_m })
 }
 
-/// Number of turns shown: fewer with more heads.
+/// Number of turns in the chart. More heads have fewer turns.
 pub(super) fn turns_shown(heads: usize) -> f64 {
     match heads {
         0 | 1 => 3.0,
@@ -61,7 +61,9 @@ pub(super) fn turns_shown(heads: usize) -> f64 {
     }
 }
 
-/// Stretch from the last head's start to the first head's end; the whole pattern if that is less than a turn.
+/// Chainages from where the last head begins to where the first head ends.
+///
+/// If that is less than a turn, it is the whole pattern.
 fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {
     let of = |head: usize| samples.iter().filter(move |sample| sample.head == head).map(|sample| sample.x_m);
     let firsts = (0..heads).map(|head| of(head).fold(f64::INFINITY, f64::min));
@@ -75,7 +77,8 @@ fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 
 }
 
 impl Laid {
-    /// The heads' tracks, split where they reverse, cross the seam, or become hidden or visible.
+    /// Tracks of the heads. They are split where a head reverses, crosses the seam, or becomes hidden or
+    /// visible.
     pub(super) fn passes(&self) -> Vec<Pass> {
         let mut passes: Vec<Pass> = Vec::new();
         for pair in self.samples.windows(2) {
@@ -83,7 +86,7 @@ impl Laid {
             if here.new_sweep || here.head != before.head {
                 continue;
             }
-            // A step to or from a hidden sample crosses wall that isn't sampled.
+            // The wall between a hidden sample and its neighbour isn't sampled.
             let hidden = here.hidden || before.hidden;
             let (from, to) = ([before.x_m, before.arc_m], [here.x_m, here.arc_m]);
             for [begin, end] in polyline::over_seam(self.perimeter_m, from, to) {
@@ -102,7 +105,8 @@ impl Laid {
         passes
     }
 
-    /// Samples near a point within `half_m` either way, with their arc length on this side of the seam.
+    /// Samples within `half_m` of a point in both directions. Their arc lengths are continuous across the
+    /// seam.
     pub(super) fn near(&self, centre: [f64; 2], half_m: [f64; 2]) -> Vec<(&PatternSample, [f64; 2])> {
         let place = |sample: &PatternSample| {
             let across_m = math::wrap_signed(sample.arc_m - centre[1], self.perimeter_m);
@@ -116,14 +120,14 @@ impl Laid {
 
     /// Centre and diameter, m, of the largest gap around an arc length.
     ///
-    /// The gap is the largest circle without samples within a turn's travel.
+    /// The gap is the largest circle without samples within the travel of a turn.
     ///
     /// `None` without T.
     pub(super) fn emptiest(&self, arc_m: f64) -> Option<([f64; 2], f64)> {
-        /// Grid points along and around.
+        /// Number of grid points along the tunnel and around the perimeter.
         const TRIED: [u32; 2] = [120, 40];
         let t_m = self.t_m?;
-        // Away from the ends, where later samples are missing.
+        // The search keeps away from the ends, where later samples are missing.
         let room_m = (self.to_m - self.from_m - self.pitch_m).max(0.0) / 2.0;
         let begin_m = self.from_m + room_m;
         let middle = [begin_m + self.pitch_m / 2.0, arc_m];

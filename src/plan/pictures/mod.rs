@@ -1,4 +1,6 @@
-//! The four charts of a plan, as SVG text: spacing around the wall, the pattern on it, T against speed, hours against T.
+//! The four charts of a plan, as SVG text.
+//!
+//! They show the spacing around the wall, the pattern on the wall, T against speed, and hours against T.
 
 mod detail;
 mod hours;
@@ -19,9 +21,9 @@ pub(crate) use speeds::speeds;
 /// Content of the charts.
 pub(crate) struct Shown<'a> {
     pub(crate) planner: &'a Planner,
-    /// Mode of the charts of perimeter and pattern.
+    /// Mode in the charts of the perimeter and the pattern.
     pub(crate) mode: usize,
-    /// Speed of these charts, m/s.
+    /// Speed in these two charts, m/s.
     pub(crate) speed_mps: f64,
     pub(crate) question: Question,
     /// Tunnel, heads and layout as text.
@@ -29,7 +31,7 @@ pub(crate) struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// Requested speed, given directly or as a time.
+    /// Requested speed, m/s. It may have been requested as a time.
     fn asked_mps(&self) -> Option<f64> {
         let needed = |time_s: f64| self.planner.inspection().length_m / time_s;
         self.question.speed_mps.or(self.question.time_s.map(needed))

@@ -1,4 +1,4 @@
-//! Modes with names and results, shared by the charts of speeds and hours.
+//! Names and results of the modes, for the charts of speeds and hours.
 
 use headrace_pictures::look::{self, Look};
 use headrace_sampling::SamplingError;
@@ -14,7 +14,7 @@ pub(super) struct Mode {
     pub(super) look: Look,
     /// Largest speed that meets the target, m/s.
     pub(super) v_max_mps: Option<f64>,
-    /// There is no T at any speed: no head sees some strip.
+    /// Whether the mode has no T at any speed, because there is a strip that no head sees.
     pub(super) blind: bool,
 }
 
@@ -40,13 +40,13 @@ pub(super) fn name(planner: &Planner, mode: usize) -> String {
     planner.modes().get(mode).map(|planned| planned.mode.name.to_uppercase()).unwrap_or_default()
 }
 
-/// Mode and speed shown, as text.
+/// The mode and speed that the charts show, as text.
 pub(super) fn at_speed(shown: &Shown<'_>) -> String {
     format!("{} at {} m/s", name(shown.planner, shown.mode), speed(shown.speed_mps))
 }
 
-/// A speed as printed: whole millimetres per second, rounded down, so that the printed one meets the target,
-/// too.
+/// A speed for printing, in whole millimetres per second. It is rounded down, so that the printed speed meets
+/// the target, too.
 pub(super) fn speed(speed_mps: f64) -> String {
     let down = (speed_mps * 1000.0 + 1e-6).floor() / 1000.0;
     if down > 0.0 { format!("{down:.3}") } else { format!("{speed_mps:.5}") }
@@ -67,7 +67,7 @@ pub(super) fn fastest(modes: &[Mode]) -> Option<&Mode> {
     met.max_by(|a, b| a.v_max_mps.unwrap_or(0.0).total_cmp(&b.v_max_mps.unwrap_or(0.0)))
 }
 
-/// Text on modes in which no head sees some strip.
+/// Text on the modes in which a strip is seen by no head.
 pub(super) fn blind_words(modes: &[Mode]) -> Vec<String> {
     let blind: Vec<&str> = modes.iter().filter(|mode| mode.blind).map(|mode| mode.name.as_str()).collect();
     match blind.len() {

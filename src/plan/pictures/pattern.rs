@@ -1,4 +1,4 @@
-//! The pattern on the unrolled wall.
+//! Chart of the sampling pattern on the unrolled wall.
 
 use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart};
@@ -20,7 +20,7 @@ const LEGEND: Px = [634.0, 412.0];
 /// Points around the wall at which spacing is compared.
 const PLACES: usize = 360;
 
-/// Draws the samples of some turns on the unrolled wall, with a circle of diameter T at the largest gap.
+/// Draws the samples of several turns on the unrolled wall, with a circle of diameter T at the largest gap.
 pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let laid = laid::lay(shown)?;
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
@@ -53,7 +53,8 @@ fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Chart<'c> {
     Chart::new(canvas, FRAME, &x, &y)
 }
 
-/// Draws the circle of diameter T: an ellipse, since the axes differ in scale, clipped to the chart.
+/// Draws the circle of diameter T, clipped to the chart. The axes differ in scale, so the circle becomes an
+/// ellipse.
 fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     let (middle, corner) = (chart.px(centre), chart.px([centre[0] + t_m / 2.0, centre[1] + t_m / 2.0]));
     chart.ellipse(middle, [corner[0] - middle[0], middle[1] - corner[1]], CIRCLE, &look::T);
@@ -61,10 +62,10 @@ fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     chart.canvas.text([14.0, 546.0], note, Side::Right, SMALL);
 }
 
-/// Pieces of a head's track, in sheet coordinates.
+/// Pieces of the heads' tracks on the sheet.
 type Ways = Vec<(usize, Vec<Px>)>;
 
-/// Draws the heads' tracks. Returns the visible ones.
+/// Draws the heads' tracks. Returns those that are visible.
 fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     let mut ways = Vec::new();
     for pass in laid.passes() {
@@ -76,9 +77,9 @@ fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     ways
 }
 
-/// Draws the heads' numbers where their tracks reach the top, or else on the longest piece.
+/// Draws each head's number where its track reaches the top, or else on the longest piece of the track.
 fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) {
-    /// Distance below which numbers overlap, pixels.
+    /// Distance below which two numbers would overlap, pixels.
     const APART_PX: f64 = 9.0;
     let mut taken: Vec<(usize, f64)> = Vec::new();
     for (head, piece) in ways {
@@ -98,7 +99,7 @@ fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) {
     }
 }
 
-/// Style of a head's track: thinner than a curve.
+/// Style of a head's track. It is thinner than a curve.
 fn way(head: usize) -> Look {
     Look { width_px: 1.5, ..look::of_several(head) }
 }
@@ -108,7 +109,7 @@ fn number(chart: &Chart<'_>, head: usize, place: Px) {
     chart.canvas.text_on_white(place, &head.to_string(), Side::Middle, letters);
 }
 
-/// Heads with their lines and markers, two to a row.
+/// Draws the heads with their lines and markers, two per row.
 fn legend(canvas: &Canvas, laid: &Laid) {
     const ROW_PX: f64 = 19.0;
     for head in 0..laid.heads {

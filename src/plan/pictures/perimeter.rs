@@ -1,4 +1,4 @@
-//! Spacing around the wall.
+//! Chart of the spacing around the wall.
 
 use headrace_pictures::canvas::{self, Canvas, NORMAL, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart, short};
@@ -21,10 +21,10 @@ const FEWER: Colour = Colour(236, 241, 246);
 const UNSEEN: Colour = Colour(214, 214, 214);
 const BAND: Colour = Colour(205, 226, 240);
 
-/// Spacing around the wall.
+/// Spacing around the wall, and the places that the chart marks.
 struct Around {
     places: Vec<WallPlace>,
-    /// Point of largest T.
+    /// Point with the largest T.
     worst: Option<WallPlace>,
     /// T of the plan, m.
     counted_m: Option<f64>,
@@ -32,8 +32,7 @@ struct Around {
     unseen_m: Option<f64>,
 }
 
-/// Draws the spacing along the perimeter: T_y, T_x, the combined T, the target, and the strips that some
-/// heads don't see.
+/// Draws the spacing along the perimeter: T_y, T_x, T, the target, and the strips that only some heads see.
 pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
     let around = Around {
@@ -71,7 +70,9 @@ impl Around {
         self.places.iter().filter_map(|place| place.t_m).fold(0.0, f64::max)
     }
 
-    /// Position of the widest strip that no head sees, and its T, unless that would dwarf all other values.
+    /// Place of the widest strip that no head sees, and the T across it.
+    ///
+    /// `None` if that T would dwarf all other values.
     fn across_m(&self) -> Option<[f64; 2]> {
         let t_m = self.counted_m.filter(|t_m| *t_m > self.most_m() && *t_m < 3.0 * self.most_m())?;
         Some([self.unseen_m?, t_m])
@@ -89,7 +90,7 @@ fn across(chart: &Chart<'_>, around: &Around) {
     chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL);
 }
 
-/// Text on the plan's T if it differs from the largest one shown; otherwise empty.
+/// Text on the T of the plan; empty unless it differs from the largest T in the chart.
 fn note(shown: &Shown<'_>, around: &Around) -> String {
     let (Some(counted_m), Some(here_m)) = (around.counted_m, around.worst.and_then(|place| place.t_m)) else {
         return String::new();
@@ -122,7 +123,7 @@ fn allowed(shown: &Shown<'_>) -> String {
 fn chart<'c>(canvas: &'c Canvas, shown: &Shown<'_>, around: &Around) -> Chart<'c> {
     let most_m = [Some(around.most_m()), around.across_m().map(|[_, t_m]| t_m), shown.question.target_m];
     let most_m = most_m.into_iter().flatten().fold(0.0, f64::max);
-    // The captions stand above the curves.
+    // There must be room for the captions above the curves.
     let top_m = if most_m > 0.0 { 1.25 * most_m } else { 1.0 };
     let perimeter_m = shown.planner.inspection().profile.perimeter_m();
     let x = Axis::new(
@@ -148,11 +149,11 @@ fn shade(chart: &Chart<'_>, stretch: &Thin) {
     }
 }
 
-/// A second row of labels: positions as hours of a clock.
+/// Draws a second row of labels: positions as clock hours.
 fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     let y = chart.frame.bottom + 34.0;
     let mut taken: Vec<[f64; 2]> = Vec::new();
-    // Floor, walls and crown come first, then the hours between them if there is room.
+    // The floor, the walls and the crown are labelled first, then the hours between them if there is room.
     let (named, between): (Vec<&Hour>, Vec<&Hour>) = hours.iter().partition(|hour| !hour.place.is_empty());
     for hour in named.into_iter().chain(between) {
         let x = chart.px([hour.arc_m, 0.0])[0];
@@ -166,7 +167,7 @@ fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     }
 }
 
-/// Captions above the thin stretches: the heads that see them.
+/// Draws captions above the thin stretches. They name the number of heads that see the stretch.
 fn captions(chart: &Chart<'_>, stretches: &[Thin]) {
     let mut last: Option<(f64, [String; 2])> = None;
     for stretch in stretches {

@@ -1,4 +1,4 @@
-//! T against speed.
+//! Chart of T against speed.
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side};
 use headrace_pictures::chart::{Axis, Chart};
@@ -14,7 +14,7 @@ const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 
 /// Number of speeds at which T is computed.
 const SPEEDS: u32 = 400;
 
-/// T of every mode against speed, with the target and the requested speed.
+/// Draws T against speed for every mode, with the target and the requested speed.
 pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let most_mps = most_mps(shown, &modes);
@@ -61,7 +61,7 @@ fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     let asked_m = here.zip(shown.asked_mps()).and_then(|((_, points), asked_mps)| {
         points.iter().find(|[v_mps, _]| *v_mps >= asked_mps).map(|[_, t_m]| 1.25 * t_m)
     });
-    // Without a target, the axis is widened to compare the other modes.
+    // Without a target, the axis is longer, so that the other modes can be compared.
     let wide = if shown.question.target_m.is_none() { 4.0 } else { 1.0 };
     let target_m = shown.question.target_m.map(|target_m| 2.6 * target_m);
     let least_m = if at_rest_m.is_finite() { 1.5 * at_rest_m } else { 0.0 };
@@ -70,7 +70,7 @@ fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     if most_m > 0.0 { most_m } else { 1.0 }
 }
 
-/// The largest T of any mode within the axis.
+/// Largest T of any mode within the speed axis.
 fn highest_m(curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     curves.iter().flat_map(|(_, points)| points).map(|[_, t_m]| *t_m).fold(0.0, f64::max)
 }
@@ -84,7 +84,7 @@ fn curve(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>,
     (0..=SPEEDS).map(point).collect()
 }
 
-/// Draws the requested speed as a line. Returns its x position and label.
+/// Draws the requested speed as a line. Returns the line's x position and its label.
 fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Option<(f64, String)> {
     let asked_mps = shown.asked_mps()?;
     chart.upright(asked_mps, &look::ASKED);
@@ -97,7 +97,7 @@ fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Option<(f64, String)> {
     Some((chart.px([asked_mps, 0.0])[0], format!("{why}{} m/s", modes::speed(asked_mps))))
 }
 
-/// Labels where curves leave the frame.
+/// Labels at the points where curves leave the frame.
 #[derive(Default)]
 struct Ends {
     right: Vec<Label>,
@@ -138,7 +138,7 @@ fn label(place: [f64; 2], mode: &Mode, words: String) -> Label {
     Label { place, lines: vec![words], look: mode.look, bold: true }
 }
 
-/// Draws markers where curves meet the target; the fastest is filled, with its speed.
+/// Draws markers where curves meet the target. The marker of the fastest mode is filled and has its speed.
 fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode]) {
     let Some(target_m) = shown.question.target_m else { return };
     let fastest = modes::fastest(modes).map(|mode| mode.number);

@@ -1,4 +1,5 @@
-//! Checks that every chart of every kind of plan is well-formed, reproducible, and has the right content.
+//! Checks every chart of every kind of plan. It must be well-formed and reproducible, and have the right
+//! content.
 
 use clap::Parser;
 use headrace_geometry::frames::Vec3;
@@ -14,9 +15,9 @@ use crate::plan::case::Case;
 const FAST: usize = 2;
 const TARGET: Question = Question { target_m: Some(0.5), speed_mps: None, time_s: None };
 const SPEED: Question = Question { target_m: None, speed_mps: Some(0.1), time_s: None };
-/// VITA 2 with four heads in phase shift: two side by side in front, two aft.
+/// VITA 2 with four heads in phase shift: two side by side in front, and two aft.
 const VITA_2: &str = "--vehicle deploy/vehicles/vita2-4.toml";
-/// The same heads in sectors. Because of their distances along the hull, no head sees some strip.
+/// The same heads with sectors. Their distances along the hull leave a strip that no head sees.
 const SECTORS: &str = "--vehicle deploy/vehicles/vita2-4.toml --layout sector_offset";
 const ONE: &str = "--tunnel ceran --length 7000";
 
@@ -32,7 +33,7 @@ fn inspection(arguments: &str) -> Inspection {
     Case::of(&plan).unwrap().inspection
 }
 
-/// A vehicle whose own parts occlude its head: to the left, or all around.
+/// A vehicle that occludes its own head, either to the left or all around.
 fn walled_in(all_around: bool) -> Inspection {
     let plate = |[x, y, z]: [f64; 3], most: [f64; 3]| Obstacle::Box {
         least: Vec3::new(x, y, z),
@@ -48,7 +49,7 @@ fn walled_in(all_around: bool) -> Inspection {
     Inspection { hull, ..inspection(ONE) }
 }
 
-/// A chart of a plan, with the checks that apply to all charts.
+/// Draws a chart of a plan, and makes the checks that apply to all charts.
 fn draw(inspection: Inspection, mode: usize, speed_mps: f64, question: Question, name: &str) -> String {
     let planner = Planner::new(inspection).unwrap();
     let title = "ceran, <4> heads & phase shift".to_owned();
@@ -91,7 +92,7 @@ fn silent(svg: &str, none: &[&str]) {
 }
 
 #[test]
-fn perimeter_names_its_curves_and_the_seeing_heads() {
+fn perimeter_chart_names_curves_clock_hours_and_number_of_heads() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "perimeter");
     says(&svg, &["Spacing around the wall: FAST at 0.115 m/s", "target 0.5 m", "T, both together:"]);
     says(&svg, &["T_x, between passes", "T_y, neighbours", "2 of 4", "9:00 left", "12:00 crown", "m, 9:00"]);
@@ -100,7 +101,7 @@ fn perimeter_names_its_curves_and_the_seeing_heads() {
 }
 
 #[test]
-fn perimeter_of_sectors_shows_two_distances_and_unseen_strips() {
+fn perimeter_chart_of_sectors_shows_alternating_distances_and_unseen_strips() {
     let svg = draw(inspection(SECTORS), 1, 0.048, TARGET, "perimeter");
     says(
         &svg,
@@ -109,7 +110,7 @@ fn perimeter_of_sectors_shows_two_distances_and_unseen_strips() {
 }
 
 #[test]
-fn pattern_shows_heads_circle_and_hidden_tracks() {
+fn pattern_chart_shows_heads_circle_and_hidden_tracks() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "pattern");
     says(
         &svg,
@@ -119,9 +120,9 @@ fn pattern_shows_heads_circle_and_hidden_tracks() {
     silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
 }
 
-/// No circle of diameter T is empty in the pattern, and no gap is larger than the one drawn.
+/// In the pattern, no empty circle has a diameter larger than T, and no gap is larger than the drawn one.
 #[test]
-fn no_circle_of_diameter_t_is_empty() {
+fn no_empty_circle_exceeds_diameter_t() {
     let plans = [
         (ONE, 0.058),
         ("--tunnel ceran --heads 4", 0.2),
@@ -142,13 +143,13 @@ fn no_circle_of_diameter_t_is_empty() {
         let worst_m = wall::unseen_m(&planner).or(wall::worst(&planner, &places).map(|place| place.arc_m));
         let shown_m = empty_m(worst_m.unwrap());
         assert!(around_m.max(shown_m) <= 1.001 * t_m, "{arguments}: {around_m} {shown_m} of {t_m}");
-        // Steep helices leave less than the diagonal of T_x and T_y.
+        // With a steep helix the largest gap is smaller than the diagonal of T_x and T_y.
         assert!(shown_m > 0.75 * t_m, "{arguments}: {shown_m} of {t_m}");
         assert!(shown_m > 0.97 * around_m, "{arguments}: {shown_m} of {around_m} elsewhere");
     }
 }
 
-/// Names of the modes that meet a target, each with `words` on its speed.
+/// Names of the modes that meet a target. `words` makes the text on each mode's speed.
 fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> Vec<String> {
     let planner = Planner::new(inspection).unwrap();
     let speed = |mode| Some((modes::name(&planner, mode), planner.v_max_mps(mode, target_m).ok()?));
@@ -157,7 +158,7 @@ fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> 
 }
 
 #[test]
-fn speeds_name_every_mode_with_its_speed() {
+fn speed_chart_names_every_mode_and_its_speed() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "speeds");
     let modes = met(inspection(VITA_2), 0.5, |v_mps| format!("{} m/s", modes::speed(v_mps)));
     assert_eq!(modes.len(), 5);
@@ -172,7 +173,7 @@ fn speeds_name_every_mode_with_its_speed() {
 }
 
 #[test]
-fn hours_mark_the_best_mode_and_the_available_time() {
+fn hour_chart_marks_the_best_mode_and_the_available_time() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "hours");
     let modes = met(inspection(VITA_2), 0.5, |v_mps| format!("{} h", modes::hours(7000.0 / v_mps / 3600.0)));
     for mode in &modes {
@@ -190,7 +191,7 @@ fn hours_mark_the_best_mode_and_the_available_time() {
 }
 
 #[test]
-fn hours_without_a_target_use_the_t_of_the_speed() {
+fn hour_chart_without_a_target_uses_t_at_the_requested_speed() {
     let planner = Planner::new(inspection(VITA_2)).unwrap();
     let finest = planner.answers(&SPEED, None).unwrap().iter().position(|answer| answer.best).unwrap();
     let svg = draw(inspection(VITA_2), finest, 0.1, SPEED, "hours");
@@ -199,8 +200,8 @@ fn hours_without_a_target_use_the_t_of_the_speed() {
 }
 
 #[test]
-fn modes_that_miss_the_target_are_drawn_and_named() {
-    // At the corners FASTEST exceeds this by its step alone.
+fn charts_show_and_name_modes_that_miss_the_target() {
+    // In the corners, the angular step of FASTEST alone gives a larger T than this target.
     let coarse = Question { target_m: Some(0.4), ..TARGET };
     for name in ["speeds", "hours"] {
         let svg = draw(inspection(VITA_2), FAST, 0.08, coarse, name);
@@ -214,7 +215,7 @@ fn modes_that_miss_the_target_are_drawn_and_named() {
 }
 
 #[test]
-fn unseen_wall_has_text_in_place_of_curves() {
+fn charts_without_visible_wall_have_text_in_place_of_curves() {
     let words = [
         "No head sees the wall anywhere",
         "No head sees part of the wall",
@@ -230,7 +231,7 @@ fn unseen_wall_has_text_in_place_of_curves() {
 }
 
 #[test]
-fn small_pipes_large_tunnels_and_many_heads_can_be_drawn() {
+fn charts_of_small_pipes_large_tunnels_and_many_heads_are_valid() {
     let asked = Question { speed_mps: Some(0.3), ..TARGET };
     for (name, _) in PICTURES {
         for heads in [1, 8] {
@@ -247,7 +248,7 @@ fn small_pipes_large_tunnels_and_many_heads_can_be_drawn() {
 }
 
 #[test]
-fn extreme_speeds_can_be_drawn() {
+fn charts_at_extreme_speeds_are_valid() {
     for speed_mps in [0.002, 5.0] {
         for (name, _) in PICTURES {
             let asked = Question { speed_mps: Some(speed_mps), ..Question::default() };

@@ -4,10 +4,10 @@ use headrace_geometry::math;
 use headrace_sampling::plan::{Planner, WallPlace};
 use headrace_sampling::strips::Strips;
 
-/// Point of largest T; among nearly equal ones the one nearest to the left wall.
+/// Point with the largest T. Of nearly equal ones, the point nearest to the left wall.
 pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace> {
-    /// Ratio above which two T count as equal: steps from a strip's edge make T slightly larger there than
-    /// within.
+    /// Ratio above which two values of T count as equal. Steps across a strip's edge make T slightly larger
+    /// there than within the strip.
     const EQUAL: f64 = 0.995;
     let profile = &planner.inspection().profile;
     let [y_m, z_m] = profile.reference();
@@ -18,12 +18,12 @@ pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace
     worst.min_by(|a, b| off_m(a).total_cmp(&off_m(b))).copied()
 }
 
-/// A stretch of the perimeter seen by fewer heads than the best-covered stretch.
+/// A stretch of the perimeter that fewer heads see than see the best-covered stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Thin {
     pub(super) from_m: f64,
     pub(super) to_m: f64,
-    /// Number of heads that see it; `of` is the largest number at any point.
+    /// Number of heads that see the stretch. `of` is the largest number of heads at any point.
     pub(super) heads: usize,
     pub(super) of: usize,
 }
@@ -38,7 +38,7 @@ impl Thin {
     }
 }
 
-/// Thin stretches at the nominal position of the vehicle. A stretch across the seam is split.
+/// Thin stretches for the nominal position of the vehicle. A stretch that crosses the seam is split.
 pub(super) fn thin(planner: &Planner) -> Vec<Thin> {
     let perimeter_m = planner.inspection().profile.perimeter_m();
     let strips = planner.nominal_strips().map(Strips::as_slice).unwrap_or_default();

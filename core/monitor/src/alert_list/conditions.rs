@@ -11,18 +11,22 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Time after the first update before data or positions that never arrived count as missing.
+/// Time after the first update from which data or positions that never arrived count as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
-/// Time for which `CannotSay` stays active after such a stretch has last grown.
+/// Time for which `CannotSay` stays active after its stretch has last grown.
 const GROWS: DurNs = DurNs(10_000_000_000);
-/// Remaining shares, percent, for warning, alarm and emergency alarm.
+/// Remaining cable, time and charge, percent, at or below which a warning, an alarm and an emergency alarm
+/// are raised.
+///
+/// A negative share means that the limit is exceeded.
 const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
 const TIME_PCT: [f64; 3] = [10.0, 0.0, -1.0];
 const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
-/// Dead band: a remainder must rise by this much, percent, to leave its priority.
+/// Dead band: the remaining amount must rise by this much above the limit of the warning, percent, before the
+/// alert ends.
 const MORE_PCT: f64 = 2.0;
 
-/// Data and positions seen at least once.
+/// Data and positions seen so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Had {
     position: bool,
@@ -36,7 +40,7 @@ pub(super) struct Had {
 /// An update, with the state as of that time.
 pub(crate) struct Beat<'a> {
     pub(crate) at: MonoNs,
-    /// State with `now` equal to the time of the update.
+    /// Live state whose `now` is the time of the update.
     pub(crate) state: &'a LiveState,
     pub(crate) setting: Option<SettingDoubt>,
 }
@@ -75,9 +79,9 @@ impl AlertList {
         self.take_recording(at, to);
     }
 
-    /// Checks sensors and remainders while no sensor delivers data.
+    /// Checks sensors and remaining resources while no sensor delivers data.
     ///
-    /// `state` is that of the last update, except that its `now` is `at`.
+    /// `state` is the live state of the last update, with `now` set to `at`.
     pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
         let Some(begun) = self.begun else { return };
         self.take_sensors(at, state, to);
@@ -85,7 +89,7 @@ impl AlertList {
         self.take_recording(at, to);
     }
 
-    /// Records whether a recording fails.
+    /// Records whether a log recording fails.
     pub(crate) fn set_recording(&mut self, fails: bool, at: MonoNs, to: &mut Telling<'_>) {
         self.recording_fails = fails;
         self.take_recording(at, to);
@@ -114,7 +118,7 @@ impl AlertList {
             .advice
             .as_ref()
             .map_or(Figures::None, |advice| Figures::Advice(AdviceFigures::of(advice, speed_mps)));
-        // The dead band of the speed lies between slightly over and too fast.
+        // Slightly over v_max the alert stays as it is: that range of speeds is its dead band.
         let is_over = condition == Condition::Over && self.is_active(ListKind::TooFast, None);
         let too_fast = condition == Condition::TooFast || is_over;
         self.observe(at, &Seen::of(ListKind::TooFast, too_fast, figures), to);
@@ -128,7 +132,7 @@ impl AlertList {
             PositionState::None(lacking) => (true, Figures::MissingSampleFinder(lacking)),
             _ => (false, Figures::None),
         };
-        // An alignment takes its time.
+        // Navigation needs time to align before it gives the first position.
         let is_late = at.since(begun).0 >= GRACE.0;
         let lacks = lacks && (self.had.position || is_late);
         self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
@@ -140,7 +144,7 @@ impl AlertList {
 
     fn take_unsure(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
         let Beat { at, state, .. } = *beat;
-        // The ends of the coverage extent are reported when they are left.
+        // Stretches at the ends of the coverage extent are reported once the vehicle has left them.
         let now = state.unsure.filter(|stretch| stretch.why != Unsure::NotInspected);
         let before = self.had.unsure;
         if now.is_some() && now != before.map(|(stretch, _)| stretch) {
@@ -253,7 +257,7 @@ impl AlertList {
         }
     }
 
-    /// Cable left beyond the vehicle's place, m; `None` if its length is unknown.
+    /// Length of cable left beyond the vehicle's place, m; `None` if the length of the cable is unknown.
     pub(super) fn cable_left_m(&self, x_m: Option<f64>) -> Option<f64> {
         self.limits.cable_m.zip(x_m).map(|(cable_m, x_m)| cable_m - x_m.max(0.0))
     }
@@ -293,8 +297,8 @@ impl AlertList {
         }
     }
 
-    /// Raises an alert, or reactivates the one that nobody has acknowledged yet: each situation has one
-    /// alert.
+    /// Raises an alert. If the situation has an alert that nobody has acknowledged yet, reactivates that
+    /// alert instead.
     fn raise_or_hold_again(
         &mut self,
         kind: ListKind,
@@ -318,7 +322,7 @@ impl AlertList {
         number
     }
 
-    /// Updates the figures of a continuing alert. A change of place is published.
+    /// Updates the figures of a continuing alert, and publishes a change of place.
     fn update(&mut self, number: u32, figures: Figures, to: &mut Telling<'_>, at: MonoNs) {
         let Some(alert) = self.get_mut(number) else { return };
         alert.figures = alert.figures.and_then(figures, alert.kind);
@@ -332,9 +336,10 @@ impl AlertList {
 }
 
 impl Figures {
-    /// Figures of a continuing situation: the present ones, except that the highest speed is kept.
+    /// Figures of a continuing situation: the present figures, but the highest speed so far.
     ///
-    /// Once the pilot has slowed down, the present speed would be one that is allowed.
+    /// Once the pilot has slowed down, the present speed would no longer show by how much the limit was
+    /// exceeded.
     fn and_then(self, now: Self, kind: ListKind) -> Self {
         match (self, now) {
             (Self::Advice(before), Self::Advice(figures))

@@ -1,7 +1,7 @@
 //! Alerts and notes as JSON. The field names are a contract; `docs/reference/live-state.schema.json` is the
 //! schema.
 //!
-//! Allocates: for outlets.
+//! Allocates: outlets only.
 
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ const RECENT: usize = 20;
 /// An alert in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ListedAlertJson {
-    /// Number from 1. It is never reused.
+    /// Number from 1; never reused.
     pub number: u32,
     /// `emergency_alarm`, `alarm`, `warning` or `caution`.
     pub priority: &'static str,
@@ -34,42 +34,43 @@ pub struct ListedAlertJson {
     pub advice: String,
     /// `active`, `rectified` or `cleared`.
     pub state: AlertState,
-    /// Time of its first raising, seconds on the log's clock.
+    /// Time at which the alert was first raised, seconds on the log's clock.
     pub since_s: f64,
-    /// Time from which its condition no longer holds.
+    /// Time at which the condition ceased to hold.
     pub rectified_s: Option<f64>,
-    /// Time at which it ended.
+    /// Time at which the alert ended.
     pub cleared_s: Option<f64>,
     /// Acknowledgement, if any.
     pub acknowledged: Option<AcknowledgedJson>,
-    /// Time until which its sound is silenced.
+    /// Time until which the alert's sound is silenced.
     pub silenced_until_s: Option<f64>,
-    /// Whether it sounds now.
+    /// Whether the alert sounds now.
     pub sounds: bool,
-    /// Whether somebody must still acknowledge it.
+    /// Whether somebody must still acknowledge the alert.
     pub needs_acknowledgement: bool,
-    /// Beginning of its stretch, or place of the vehicle when it was raised, m.
+    /// Beginning of the alert's stretch, or place of the vehicle when the alert was raised, m.
     pub from_m: Option<f64>,
-    /// End of its stretch, m.
+    /// End of the alert's stretch, m.
     pub to_m: Option<f64>,
     /// Place to go back to, m.
     pub back_to_m: Option<f64>,
-    /// Largest speed for passing it again, m/s.
+    /// Largest speed for passing the stretch again, m/s.
     pub at_most_mps: Option<f64>,
-    /// Id of the sensor that it names.
+    /// Id of the sensor that the alert names.
     pub sensor: Option<String>,
-    /// Number of times that it was raised; for missed stretches, number of stretches that it represents.
+    /// Number of times that the alert was raised. For missed stretches: number of stretches that the alert
+    /// represents.
     pub count: u32,
-    /// Alert that it was merged into.
+    /// Number of the alert into which this alert was merged.
     pub merged_into: Option<u32>,
 }
 
-/// Acknowledgement of an alert.
+/// Acknowledgement of an alert, with person and time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AcknowledgedJson {
     /// Person or device.
     pub by: String,
-    /// Time, seconds on the log's clock.
+    /// Time of the acknowledgement, seconds on the log's clock.
     pub at_s: f64,
 }
 
@@ -90,12 +91,12 @@ pub struct AlertCountsJson {
     pub caution: u32,
 }
 
-/// Remaining cable, time and charge, as far as they are known.
+/// Remaining cable, time and charge. An unknown amount is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct LeftJson {
-    /// Cable beyond the vehicle's place, m.
+    /// Length of cable left beyond the vehicle's place, m.
     pub cable_m: Option<f64>,
-    /// Time, seconds; negative once it is used up.
+    /// Time left, seconds; negative after the end of the planned dive time.
     pub time_s: Option<f64>,
     /// Charge of the battery, percent.
     pub battery_pct: Option<f64>,
@@ -110,13 +111,13 @@ pub struct NoteJson {
     pub at_s: f64,
     /// Author.
     pub by: String,
-    /// Text; empty for a mark and a voice note.
+    /// Text; empty for a mark or a voice note.
     pub text: String,
-    /// Recording, of a voice note.
+    /// Recording; `None` unless this is a voice note.
     pub voice: Option<SpokenJson>,
     /// Place of the vehicle, m; `None` without a position.
     pub chainage_m: Option<f64>,
-    /// Place of the vehicle as stationing.
+    /// Place of the vehicle as stationing, such as 1+240.50.
     pub station: Option<String>,
 }
 
@@ -125,12 +126,12 @@ pub struct NoteJson {
 pub struct SpokenJson {
     /// Id that ties the note to its recording in the log.
     pub id: u32,
-    /// Length of its recording, seconds; `None` until a recording is in the log.
+    /// Length of the recording, seconds; `None` until the recording is in the log.
     pub seconds: Option<u32>,
 }
 
 impl NoteJson {
-    /// Text for display.
+    /// Note as text for display.
     pub fn words(&self) -> String {
         match &self.voice {
             Some(SpokenJson { seconds: Some(seconds), .. }) => format!("voice, {seconds} s"),

@@ -9,11 +9,11 @@ pub use headrace_vehicle::AlertClass;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Priority {
-    /// For information. It needs no acknowledgement.
+    /// For information; needs no acknowledgement.
     Caution,
-    /// Needs attention before it becomes worse.
+    /// The situation needs attention before it becomes worse.
     Warning,
-    /// Needs action.
+    /// The situation needs action now.
     Alarm,
     /// The vehicle may be lost.
     EmergencyAlarm,
@@ -36,7 +36,7 @@ impl Priority {
 pub enum ListKind {
     /// Sections are flagged as missed.
     Missed,
-    /// Sections judged now get no verdict.
+    /// Newly judged sections get no verdict.
     CannotSay,
     /// The speed is over v_max.
     TooFast,
@@ -70,7 +70,7 @@ pub enum ListKind {
     OutsideTunnel,
     /// Most samples contradict the profile; see [`AlertKind::ProfileContradicted`].
     ProfileContradicted,
-    /// A recording fails.
+    /// A log recording fails.
     NotRecorded,
     /// Little cable is left.
     CableLeft,
@@ -168,7 +168,7 @@ impl ListKind {
         }
     }
 
-    /// Priority when it is raised. A smaller remainder may raise it.
+    /// Priority when the alert is raised. It may rise later as cable, time or charge runs out.
     pub fn priority(self) -> Priority {
         match self {
             Self::CannotSay | Self::TurnFails => Priority::Caution,
@@ -202,8 +202,9 @@ impl ListKind {
         AlertKind::ALL.into_iter().find(|kind| Self::from(*kind) == self)
     }
 
-    /// Whether it may name a sensor: the cable counter may differ from the inertial unit or from a velocity
-    /// log.
+    /// Whether an alert of this kind may name a sensor.
+    ///
+    /// For the cable counter, the sensor is the velocity log that it differs from, if any.
     pub(super) fn may_name_a_sensor(self) -> bool {
         self.is_of_sensor() || self == Self::CableDoubted
     }

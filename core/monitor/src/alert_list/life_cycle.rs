@@ -17,8 +17,9 @@ pub(crate) struct Telling<'a> {
 }
 
 impl Telling<'_> {
-    /// Publishes a change. Allocates: never. The digest includes a notice even if the queue has no room for
-    /// it.
+    /// Publishes a change. Allocates: never.
+    ///
+    /// The digest includes a notice even if the queue has no room for it.
     pub(super) fn tell(&mut self, alert: &ListedAlert, change: AlertChange, at: MonoNs) {
         digest(self.stream, alert, change, at);
         if self.notices.0.len() < self.notices.0.capacity() {
@@ -49,7 +50,7 @@ fn digest(stream: &mut ResultStream, alert: &ListedAlert, change: AlertChange, a
 }
 
 impl Figures {
-    /// Figure that represents them in digests.
+    /// Figure that represents the alert's figures in digests.
     fn first(&self) -> f64 {
         match *self {
             Self::None => 0.0,
@@ -93,7 +94,7 @@ impl AlertList {
             merged_into: None,
             figures,
         };
-        // There is room now.
+        // `make_room` has freed an entry.
         if self.alerts.len() < self.alerts.capacity() {
             self.alerts.push(alert);
         }
@@ -101,8 +102,8 @@ impl AlertList {
         alert.number
     }
 
-    /// Drops the oldest cleared alert if there is no room for another. If no alert is cleared, two missed
-    /// stretches share one.
+    /// Drops the oldest cleared alert if the list is full. If no alert is cleared, two missed stretches then
+    /// share one alert.
     fn make_room(&mut self, at: MonoNs, to: &mut Telling<'_>) {
         if self.alerts.len() < MOST_LISTED {
             return;
@@ -111,7 +112,7 @@ impl AlertList {
             self.share_one(at, to);
         }
         let oldest = self.alerts.iter().position(|alert| !alert.is_live());
-        // Situations other than missed stretches are far fewer than the capacity.
+        // There are far fewer situations other than missed stretches than entries.
         let oldest =
             oldest.or_else(|| self.alerts.iter().position(|alert| alert.priority == Priority::Caution));
         if let Some(oldest) = oldest {
@@ -147,7 +148,7 @@ impl AlertList {
         to.tell(&alert, change, at);
     }
 
-    /// Acknowledges the alert with this number, or all alerts with 0. False if there was nothing to
+    /// Acknowledges the alert with this number, or all alerts with 0. Returns false if there was nothing to
     /// acknowledge.
     pub(crate) fn acknowledge(&mut self, number: u32, by: Who, at: MonoNs, to: &mut Telling<'_>) -> bool {
         let mut any = false;
@@ -165,7 +166,7 @@ impl AlertList {
         any
     }
 
-    /// Silences all sounding alerts. False if none sounded.
+    /// Silences all sounding alerts. Returns false if none sounded.
     pub(crate) fn silence(&mut self, at: MonoNs, to: &mut Telling<'_>) -> bool {
         let mut any = false;
         for alert in self.alerts.iter_mut().filter(|alert| alert.sounds(at)) {
@@ -176,7 +177,7 @@ impl AlertList {
         any
     }
 
-    /// Raises the priority. An alert with a higher priority must be acknowledged again.
+    /// Raises the priority of an alert, which must then be acknowledged again.
     pub(super) fn set_priority(&mut self, number: u32, priority: Priority, at: MonoNs, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number).filter(|alert| alert.priority < priority) else { return };
         alert.priority = priority;

@@ -1,4 +1,4 @@
-//! Alerts for missed stretches: one per run of flagged sections, merged as the runs are.
+//! Alerts for missed stretches: one per run of flagged sections. If two runs merge, their alerts merge, too.
 
 use super::{AlertChange, AlertList, AlertState, Figures, ListKind, ListedAlert, Telling};
 use crate::pilot_text::CauseFigures;
@@ -8,15 +8,15 @@ use headrace_geometry::time::MonoNs;
 /// A changed run, with its figures at the time of the change.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunInput {
-    /// Index of the event at which it was judged; for an update, of the event that follows the update.
+    /// Index of the event at which the run was judged. For an update: index of the event after the update.
     pub(crate) event: usize,
-    /// It was judged at an update, which precedes that event.
+    /// Whether the run was judged at an update before that event.
     pub(crate) at_beat: bool,
     pub(crate) at: MonoNs,
     pub(crate) id: RunId,
     pub(crate) change: RunChange,
     pub(super) stretch: (i64, i64),
-    /// Causes, and arc length of the worst hole, m.
+    /// Causes, and arc length of the largest hole, m.
     pub(super) causes: Option<(CauseFigures, f64)>,
     pub(super) merged_into: Option<RunId>,
 }
@@ -73,7 +73,7 @@ impl AlertList {
         let v_max_mps = self.v_max_mps;
         let figures =
             input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
-        // This is a part of a stretch that already has an alert, left over by a later pass.
+        // A later pass has left over this part of a stretch, and the stretch already has an alert.
         let (from, until) = input.stretch;
         let has = |alert: &&ListedAlert| {
             alert.kind == ListKind::Missed
@@ -96,7 +96,7 @@ impl AlertList {
 
     /// Adapts an alert to a run that has grown, or that has shrunk if it is the alert's only run.
     ///
-    /// A gap filled in its middle leaves one alert.
+    /// If a later pass splits a run in two, one alert covers both runs.
     fn widen(&mut self, number: u32, input: &RunInput, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         let (from, until) = alert.stretch.unwrap_or(input.stretch);
@@ -126,13 +126,13 @@ impl AlertList {
         }
     }
 
-    /// Two runs have merged. The alert with the lower number represents both.
+    /// Merges the alerts of two merged runs. The alert with the lower number represents both runs.
     fn merge_runs(&mut self, input: &RunInput, to: &mut Telling<'_>) {
         let Some(into) = input.merged_into else { return };
         let (other, kept) = (self.alert_of(input.id), self.alert_of(into));
         self.set_alert_of(input.id, 0);
         if other == kept {
-            // Two runs of one alert have merged.
+            // Both runs already had the same alert.
             if let Some(alert) = self.get_mut(kept) {
                 alert.open_runs = alert.open_runs.saturating_sub(1);
             }
@@ -175,8 +175,8 @@ impl AlertList {
         to.tell(&kept, AlertChange::Changed, at);
     }
 
-    /// Frees an entry of a list full of live alerts: the newest missed stretch is merged into its nearest
-    /// neighbour.
+    /// Merges the newest missed stretch into its nearest neighbour, which frees an entry of a list full of
+    /// live alerts.
     pub(super) fn share_one(&mut self, at: MonoNs, to: &mut Telling<'_>) {
         let stretches = || {
             let missed = self.alerts.iter().filter(|alert| alert.kind == ListKind::Missed && alert.is_live());

@@ -56,7 +56,7 @@ impl Bench {
 /// Possible events.
 #[derive(Debug, Clone, Copy)]
 enum Happens {
-    /// An update at which each situation holds or not.
+    /// An update, with the conditions that hold.
     Beat([bool; 3]),
     AcknowledgeNewest,
     AcknowledgeAll,
@@ -64,7 +64,7 @@ enum Happens {
     Snapshot,
 }
 
-/// One kind of each priority with a situation of its own.
+/// One kind for each of three priorities. Each kind has a single situation.
 const KINDS: [ListKind; 3] = [ListKind::TooFast, ListKind::NotRecorded, ListKind::TurnFails];
 const BEAT_MS: u64 = 200;
 
@@ -74,15 +74,14 @@ const BEAT_MS: u64 = 200;
 struct Oracle {
     history: Vec<(u64, bool)>,
     is_caution: bool,
-    /// Number, state, acknowledged, silenced until, count.
+    /// Number, state, acknowledged, silenced until and count of each alert.
     all: Vec<(u32, &'static str, bool, u64, u32)>,
 }
 
 impl Oracle {
-    /// Time for which the condition has held, including breaks shorter than `least_ms`, and time for which it
-    /// hasn't.
+    /// Times for which the condition has held and for which it hasn't, up to now.
     ///
-    /// Derived from the latest history only.
+    /// Breaks shorter than `least_ms` count as time for which the condition held.
     fn spells_ms(&self, least_ms: u64) -> (Option<u64>, Option<u64>) {
         let now = self.history.last().map_or(0, |(at, _)| *at);
         let off_from = |until: usize| {
@@ -90,7 +89,7 @@ impl Oracle {
             back.last().map(|(at, _)| *at)
         };
         let off = off_from(self.history.len()).map(|from| now - from);
-        // The first time that the condition held after the last long break.
+        // The first time at which the condition held after the last long break.
         let (mut on, mut break_from) = (None, None);
         for (at, held) in &self.history {
             if *held {
@@ -114,7 +113,7 @@ impl Oracle {
             "active unacknowledged" | "active acknowledged" | "active caution"
                 if off.is_some_and(|off| off >= off_ms) =>
             {
-                // After its end, a situation starts afresh.
+                // A situation starts afresh after its alert has ended.
                 self.history.clear();
                 self.all.last_mut().unwrap().1 =
                     if state == "active unacknowledged" { "rectified unacknowledged" } else { "cleared" };
@@ -165,7 +164,8 @@ fn happens() -> impl Strategy<Value = Happens> {
 }
 
 proptest! {
-    /// Every alert is in the state of the table after any conditions and operator commands.
+    /// After any conditions and operator commands, every alert is in the state that the table of MSC.302(87)
+    /// gives.
     #[test]
     fn alert_life_cycle_follows_the_msc_table(
         steps in proptest::collection::vec((happens(), 1usize..8), 1..120),
@@ -238,7 +238,7 @@ fn flickering_speed_raises_one_alert() {
         bench.with(|list, to| list.observe(MonoNs(beat * 200_000_000), &seen, to));
     }
     assert_eq!((bench.list.raised(), bench.notices.0.len()), (1, 1));
-    // Without hold time and dead band there are ten alerts a minute.
+    // Without hold time and dead band, the same speeds raise ten alerts a minute.
     let mut bench = Bench::new(0.0, 0.0);
     for beat in 0..300_u64 {
         let seen = Seen::of(ListKind::TurnFails, beat % 3 != 0, Figures::None);
@@ -283,7 +283,7 @@ fn higher_priority_needs_a_new_acknowledgement() {
     beat(&mut bench, 4, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, true)));
     bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(5), to));
-    // The charge flickers.
+    // The charge varies within the dead band.
     beat(&mut bench, 6, 11.0);
     beat(&mut bench, 7, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, false)));
@@ -299,7 +299,7 @@ fn alert_spans_the_part_still_missed() {
     bench.run(0, RunChange::Changed, (40, 64), None);
     bench.run(0, RunChange::Changed, (40, 52), None);
     assert_eq!(stretch(&bench), Some((40, 52)), "the far end was passed again");
-    // The middle was passed again: two runs of one alert.
+    // A second pass covers the middle. The alert then has two runs.
     bench.run(1, RunChange::Raised, (48, 52), None);
     bench.run(0, RunChange::Changed, (40, 44), None);
     assert_eq!((stretch(&bench), bench.list.iter().count()), (Some((40, 52)), 1));
@@ -319,7 +319,7 @@ fn merged_runs_keep_the_lower_number_and_stay_unacknowledged() {
     let [kept, gone] = [1, 2].map(|number| *bench.list.get(number).unwrap());
     assert_eq!((kept.stretch, kept.count, kept.needs_acknowledgement()), (Some((10, 15)), 2, true));
     assert_eq!((gone.state, gone.merged_into), (AlertState::Cleared, Some(1)));
-    // A later pass fills the middle and leaves another run: still one alert. Then all of it is filled.
+    // A later pass covers the middle, so the alert has two runs. Then both are covered.
     bench.run(2, RunChange::Raised, (13, 15), None);
     bench.run(0, RunChange::Changed, (10, 12), None);
     assert_eq!(bench.list.raised(), 2);
@@ -334,8 +334,8 @@ fn merged_runs_keep_the_lower_number_and_stay_unacknowledged() {
 }
 
 proptest! {
-    /// 7 km of runs are raised and cleared at random. Every unacknowledged missed stretch stays in an alert,
-    /// the list never grows, and no alert holds once all is filled.
+    /// Runs in a tunnel of 7 km are raised and cleared at random. Every unacknowledged missed stretch stays
+    /// in an alert, and the list never exceeds its capacity. No alert is active once every run is cleared.
     #[test]
     fn full_list_loses_no_missed_stretch(
         events in proptest::collection::vec((0u8..10, 0u32..2000), 800..2500),

@@ -1,4 +1,5 @@
-//! Texts of alerts, from the table used for the pilot's other lines. Allocates: for outlets, not for a tick.
+//! Texts of alerts, from the same table as the pilot's other lines. Allocates: outlets only, never within a
+//! tick.
 
 use super::{AlertState, Figures, ListKind, ListedAlert};
 use crate::app::SourceInfo;
@@ -22,7 +23,7 @@ pub struct TextContext<'a> {
     pub section_m: f64,
     /// Target T, m.
     pub target_m: f64,
-    /// Confidence: standard deviations of a hole by which a verdict must clear the target.
+    /// Confidence: number of standard deviations of the hole by which a verdict must clear the target.
     pub confidence_sd: f64,
     /// Sections, for the place to go back to.
     pub sections: &'a Sections,
@@ -31,7 +32,7 @@ pub struct TextContext<'a> {
 }
 
 impl<'a> TextContext<'a> {
-    /// Surroundings of a dive.
+    /// Context for the texts of a dive's alerts.
     pub(crate) fn of(
         sources: &'a [SourceInfo],
         profile: &'a Profile,
@@ -59,7 +60,7 @@ impl<'a> TextContext<'a> {
 }
 
 impl ListedAlert {
-    /// Beginning and end of its stretch, m.
+    /// Beginning and end of the alert's stretch, m.
     pub fn bounds_m(&self, section_m: f64) -> (Option<f64>, Option<f64>) {
         match self.stretch {
             Some((from, to)) => (Some(from as f64 * section_m), Some(to as f64 * section_m)),
@@ -113,7 +114,7 @@ impl ListedAlert {
         }
     }
 
-    /// Text of the action; empty if there is none, and once the alert has ended.
+    /// Text of the action; empty if there is none or if the alert has ended.
     pub fn advice(&self, around: &TextContext<'_>) -> String {
         if self.state != AlertState::Active {
             return String::new();
@@ -155,7 +156,7 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
     }
 }
 
-/// Text of a line that begins with `ch` and its place.
+/// Puts the place first in a text about this chainage, m.
 fn place_first(text: &str, x_m: f64) -> String {
     let place = station(x_m);
     let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();

@@ -17,7 +17,7 @@ pub(super) fn place(kind: ListKind, source: Option<SourceId>) -> usize {
 /// Timer of a situation.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Timer {
-    /// Number of its alert while that is active, otherwise zero.
+    /// Number of the active alert; zero if no alert is active.
     pub(super) number: u32,
     /// Time since which the condition has held, short breaks included.
     on: Option<MonoNs>,
@@ -39,8 +39,10 @@ pub(super) enum Due {
 }
 
 impl Timer {
-    /// Updates the timer at `at`. A break shorter than `off` doesn't end an alert; one shorter than `hold`
-    /// doesn't restart the hold time.
+    /// Updates the timer at `at`.
+    ///
+    /// A break shorter than `off` doesn't end an alert. A break shorter than `hold` doesn't restart the hold
+    /// time.
     pub(super) fn take(&mut self, at: MonoNs, holds: bool, hold: DurNs, off: DurNs) -> Due {
         let is_active = self.number != 0;
         if holds {

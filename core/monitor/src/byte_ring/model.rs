@@ -1,8 +1,8 @@
-//! A ring for loom, which explores all orders of its accesses and all effects of weaker memory.
+//! A ring for loom, which explores all orders of memory accesses and all effects of weak memory ordering.
 //!
-//! The indices are loom's, with the orderings of ringbuf's. The bytes are visible as soon as they are stored.
-//! That is no weaker: the bytes that a reader may see follow from the indices alone, which ringbuf
-//! guarantees.
+//! The indices are loom's atomics, with the same memory orderings as in ringbuf. The bytes are visible as
+//! soon as they are stored. The model is still as weak as ringbuf: only the indices decide which bytes a
+//! reader may see.
 
 use std::sync::atomic::AtomicU8;
 use std::sync::atomic::Ordering::Relaxed;
@@ -26,13 +26,13 @@ impl Shared {
     }
 }
 
-/// Writing end. It caches its own index, since loom would take a load of it for one that hides the reader's.
+/// Writing end. It caches its own index: with an additional load, loom would miss orders of accesses.
 pub struct ModelProducer {
     shared: Arc<Shared>,
     write: usize,
 }
 
-/// Reading end. It caches its own index, too.
+/// Reading end. It caches its own index, like the writing end.
 pub struct ModelConsumer {
     shared: Arc<Shared>,
     read: usize,
@@ -90,9 +90,10 @@ impl ByteConsumer for ModelConsumer {
     }
 }
 
-/// A reading end that assumes all bytes are present, so a protocol on it doesn't wait for its message.
+/// A reading end that claims that all bytes are present, so that a protocol doesn't wait for the whole
+/// packet.
 ///
-/// Models of broken protocols use it and must be found to fail.
+/// Models of broken protocols use it. loom must find them to fail.
 pub struct Hasty(pub ModelConsumer);
 
 impl ByteConsumer for Hasty {
@@ -113,12 +114,12 @@ impl ByteConsumer for Hasty {
     }
 }
 
-/// The loop's ring on a model.
+/// Ring of the loop, built on the model.
 pub fn packets(capacity: usize) -> (Port<ModelProducer>, ModelReader) {
     packets_by(capacity, |consumer| consumer)
 }
 
-/// The loop's ring on a model, with another reading end.
+/// Ring of the loop, built on the model with another reading end.
 pub fn packets_by<R: ByteConsumer>(
     capacity: usize,
     reading: impl FnOnce(ModelConsumer) -> R,
@@ -127,11 +128,11 @@ pub fn packets_by<R: ByteConsumer>(
     (Port::on(producer), ModelReader(PortReader::on(reading(consumer))))
 }
 
-/// Reading end of the loop's ring on a model.
+/// Reading end of the loop's ring, built on the model.
 pub struct ModelReader<R: ByteConsumer = ModelConsumer>(PortReader<R>);
 
 impl<R: ByteConsumer> ModelReader<R> {
-    /// Next packet as the loop takes it: receive time and bytes.
+    /// Next packet in the order in which the loop takes it: receive time and bytes.
     pub fn take_next(&mut self) -> Option<(u64, Vec<u8>)> {
         let header = self.0.peek()?;
         let mut bytes = vec![0; header.len];
@@ -140,7 +141,7 @@ impl<R: ByteConsumer> ModelReader<R> {
     }
 }
 
-/// Runs a model, prints its number of executions, and returns it.
+/// Runs a model. Prints and returns its number of executions.
 pub fn explore(name: &str, preemptions: Option<usize>, model: impl Fn() + Sync + Send + 'static) -> usize {
     let executions = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
     let count = std::sync::Arc::clone(&executions);

@@ -1,4 +1,4 @@
-//! Commands and their JSON: read strictly, without allocation.
+//! Commands and their strict JSON parser, which doesn't allocate.
 
 use core::fmt::Write as _;
 
@@ -39,41 +39,41 @@ pub enum Command {
         /// Author.
         by: Who,
     },
-    /// Adds a voice note at the present place: its recording begins.
+    /// Adds a voice note at the present place, when its recording begins.
     Voice {
-        /// Id that ties the note to its recording; not 0.
+        /// Id that ties the note to its recording; never 0.
         id: u32,
         /// Author.
         by: Who,
     },
-    /// From the program: the recording of a voice note is in the log.
+    /// Sent by the program: the recording of a voice note is in the log.
     Voiced {
         /// Id of the note.
         id: u32,
-        /// Length, seconds, 1 to 60.
+        /// Length of the recording, seconds, 1 to 60.
         seconds: u32,
     },
-    /// From the program: a recording fails, or works again.
+    /// Sent by the program: a log recording fails, or works again.
     Recording {
-        /// Whether it fails.
+        /// Whether a recording fails.
         fails: bool,
     },
-    /// From outside: remaining resources of the vehicle.
+    /// Sent by other equipment: remaining resources of the vehicle.
     Limits {
-        /// Charge of its battery, percent.
+        /// Charge of the vehicle's battery, percent.
         battery_pct: f64,
     },
-    /// From the program: time passes although no sensor delivers data.
+    /// Sent by the program: time passes although no sensor delivers data.
     Time,
 }
 
-/// Reason for which bytes are no command.
+/// Reason for which a packet is not a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("reading a command, at byte {at}: expected {expected}")]
 pub struct CommandError {
     /// Index of the first wrong byte.
     pub at: usize,
-    /// Allowed input there.
+    /// Input allowed at this place.
     pub expected: &'static str,
 }
 
@@ -96,7 +96,7 @@ struct Values {
 }
 
 impl Command {
-    /// Whether an operator may send it. The program itself sends the others.
+    /// Whether an operator may send this command. Only the program sends the others.
     pub fn is_operators(&self) -> bool {
         matches!(
             self,
@@ -117,7 +117,7 @@ impl Command {
         }
     }
 
-    /// Parses a packet: one JSON object with the keys of its command and no others. Allocates: never.
+    /// Parses a packet: one JSON object with exactly the keys of its command. Allocates: never.
     ///
     /// Errors: the first deviation from that form.
     pub fn parse(bytes: &[u8]) -> Result<Self, CommandError> {
@@ -131,7 +131,7 @@ impl Command {
         values.command().map_err(|expected| CommandError { at: 0, expected })
     }
 
-    /// The command as a packet.
+    /// The command as a JSON packet.
     pub fn to_json(&self) -> String {
         let mut json = String::with_capacity(64);
         let by = |json: &mut String, by: &Who| quote(json, ",\"by\":", by.as_str());
@@ -173,7 +173,7 @@ impl Command {
     }
 }
 
-/// Appends a key and a text, which has no control characters.
+/// Appends a key and its text, which has no control characters.
 fn quote(json: &mut String, key: &str, text: &str) {
     json.push_str(key);
     json.push('"');
@@ -187,7 +187,7 @@ fn quote(json: &mut String, key: &str, text: &str) {
 }
 
 impl Values {
-    /// Builds the command from exactly its own keys.
+    /// Builds the command. Its keys must be complete, and there must be no others.
     fn command(self) -> Result<Command, &'static str> {
         let Self { what, alert, by, text, fails, battery_pct, id, seconds } = self;
         let what = what.ok_or("the key \"do\"")?;
@@ -245,7 +245,7 @@ impl Scan<'_> {
         self.at += self.rest().bytes().take_while(is_space).count();
     }
 
-    /// Skips blanks, and consumes `word` if it comes next. Returns whether it did.
+    /// Skips blanks, and consumes `word` if it comes next. Returns true if it did.
     fn has(&mut self, word: &str) -> bool {
         self.skip_space();
         let has = self.rest().starts_with(word);
@@ -304,7 +304,7 @@ impl Scan<'_> {
         if self.has("false") { Ok(false) } else { self.wrong("true or false") }
     }
 
-    /// Scans a number as JSON writes it, without an exponent.
+    /// Scans a JSON number without an exponent.
     fn number(&mut self) -> &str {
         let bytes = self.rest().as_bytes();
         let digits = |from: usize| bytes.iter().skip(from).take_while(|byte| byte.is_ascii_digit()).count();
@@ -363,11 +363,11 @@ impl Scan<'_> {
         Some(char)
     }
 
-    /// Character that an escape represents, after its backslash.
+    /// Character represented by an escape sequence, after its backslash.
     fn escaped(&mut self) -> Option<char> {
         match self.next()? {
             char @ ('"' | '\\' | '/') => Some(char),
-            // These are refused later as control characters.
+            // The text's check for control characters refuses these later.
             'b' | 'f' | 'n' | 'r' | 't' => Some('\n'),
             'u' => {
                 let first = self.unit()?;

@@ -8,7 +8,7 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{Packet, SourceId};
 
-/// Maximum number of commands in a tick: more than the source's ring holds.
+/// Maximum number of commands in a tick. The console's ring holds fewer.
 const MOST_OF_TICK: usize = 256;
 
 /// Traffic statistics of the console.
@@ -16,9 +16,9 @@ const MOST_OF_TICK: usize = 256;
 pub struct ConsoleCounts {
     /// Number of packets.
     pub packets: u64,
-    /// Number of packets that are no command.
+    /// Number of packets that are not a command.
     pub invalid: u64,
-    /// Commands without effect: the alert doesn't exist, or needs no acknowledgement.
+    /// Number of commands without effect: the alert doesn't exist, or needs no acknowledgement.
     pub without_effect: u64,
 }
 
@@ -31,10 +31,10 @@ pub(crate) struct Console {
 
 stateful!(Console { state: counts; fixed: source; });
 
-/// A command, and its place among the readings.
+/// A command and its place among the tick's events.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReceivedCommand {
-    /// Index into this tick's events of the first one after it.
+    /// Index of the first event of this tick that comes after the command.
     pub(crate) before: usize,
     pub(crate) at: MonoNs,
     pub(crate) command: Command,
@@ -45,7 +45,7 @@ pub(crate) struct ReceivedCommand {
 pub(crate) struct Commands(pub(crate) Vec<ReceivedCommand>);
 
 impl Commands {
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory of the list.
     pub(crate) fn new() -> Self {
         Self(Vec::with_capacity(MOST_OF_TICK))
     }
@@ -56,7 +56,7 @@ impl Console {
         Self { source, counts: ConsoleCounts::default() }
     }
 
-    /// Takes a packet that comes before the event with this index.
+    /// Adds a packet that comes before the event with this index.
     pub(crate) fn take(&mut self, packet: Packet<'_>, before: usize, commands: &mut Commands) {
         self.counts.packets += 1;
         match Command::parse(packet.bytes) {

@@ -34,7 +34,7 @@ fn commands_are_read_as_documented() {
 }
 
 #[test]
-fn ports_take_as_many_notes_as_the_report_holds() {
+fn ports_accept_as_many_notes_as_the_report_holds() {
     let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
     let port = ConsolePort { waiting: Arc::clone(&waiting), clock: None, notes: Arc::default() };
     let other = port.clone();
@@ -52,7 +52,7 @@ fn ports_take_as_many_notes_as_the_report_holds() {
 }
 
 #[test]
-fn notes_without_room_in_the_queue_are_not_counted() {
+fn note_refused_by_a_full_queue_is_not_counted() {
     let port = ConsolePort { waiting: Arc::new(ArrayQueue::new(1)), clock: None, notes: Arc::default() };
     let note = Command::Note { text: NoteText::default(), by: who("AB") };
     assert_eq!(port.send(&note), Ok(()));
@@ -62,7 +62,7 @@ fn notes_without_room_in_the_queue_are_not_counted() {
 }
 
 #[test]
-fn invalid_command_is_refused_with_its_place() {
+fn invalid_command_is_refused_with_the_place_of_the_error() {
     let long = format!(r#"{{"do":"note","text":"{}","by":"AB"}}"#, "x".repeat(241));
     let longest = format!(r#"{{"do":"time"{}}}"#, " ".repeat(500));
     for json in [
@@ -115,7 +115,7 @@ fn invalid_command_is_refused_with_its_place() {
 }
 
 proptest! {
-    /// A command accepted from any bytes is JSON with the same values, according to another reader.
+    /// Every accepted command is valid JSON with the same values, as an independent JSON parser shows.
     #[test]
     fn accepted_command_is_valid_json(text in "\\PC{0,60}", by in "[ -~]{0,16}", cut in 0usize..90) {
         let written = json!({"do": "note", "text": text, "by": by}).to_string();
@@ -131,7 +131,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_a_command_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+    fn any_packet_is_parsed_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
         if Command::parse(&bytes).is_ok() {
             prop_assert!(serde_json::from_slice::<serde_json::Value>(&bytes).is_ok());
         }

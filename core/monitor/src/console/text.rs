@@ -1,4 +1,4 @@
-//! Short texts by value.
+//! Short texts stored inline.
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -23,7 +23,7 @@ impl<const BYTES: usize> ShortText<BYTES> {
         text.chars().all(|char| all.push(char)).then_some(all)
     }
 
-    /// As much of a text as fits, without control characters.
+    /// The beginning of a text, as far as it fits, without control characters.
     pub fn cut(text: &str) -> Self {
         let mut all = Self::default();
         let mut fits = text.chars().filter(|char| !char.is_control());
@@ -31,7 +31,8 @@ impl<const BYTES: usize> ShortText<BYTES> {
         all
     }
 
-    /// Appends a character. False, with nothing added, if there is no room or it is a control character.
+    /// Appends a character. Returns false, and appends nothing, if there is no room or if it is a control
+    /// character.
     pub(super) fn push(&mut self, char: char) -> bool {
         let from = usize::from(self.len);
         let room = self.bytes.get_mut(from..from + char.len_utf8()).filter(|_| !char.is_control());
@@ -45,7 +46,7 @@ impl<const BYTES: usize> ShortText<BYTES> {
     /// The text.
     pub fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..usize::from(self.len)).unwrap_or_default();
-        // The bytes are whole characters.
+        // Only whole characters are appended.
         core::str::from_utf8(bytes).unwrap_or_default()
     }
 }

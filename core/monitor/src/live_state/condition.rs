@@ -1,4 +1,4 @@
-//! Condition and lamp: the most important fact for the pilot, and its colour.
+//! Condition and lamp: the most important fact for the pilot, and the colour for it.
 
 use serde::Serialize;
 
@@ -7,14 +7,16 @@ use headrace_fusion::NoFix;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::advice::Reason;
 
-/// Ratio to v_max above which a speed is over it: covers the advice's margin and the measurement error.
+/// Ratio to v_max above which a speed is over v_max.
+///
+/// The margin covers the measurement error and the advice's own margin.
 const OVER: f64 = 1.02;
-/// Ratio to v_max below which a speed counts as different from it.
+/// Ratio to v_max below which a speed is clearly below v_max.
 const UNDER: f64 = 0.97;
-/// Ratio to v_max above which a speed is too fast: a pilot who follows the advice stays below it.
+/// Ratio to v_max above which a speed is too fast. A pilot who follows the advice stays below this ratio.
 const TOO_FAST: f64 = 1.05;
 
-/// Present condition; if several hold, the first of this list.
+/// Present condition. If several conditions hold, the first one in this list counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Condition {
     /// No sensor has delivered data.
@@ -23,28 +25,26 @@ pub enum Condition {
     Old(DurNs),
     /// There is no position, for this reason.
     NoPosition(NoFix),
-    /// No head is inside the tunnel, whose end or beginning is at this chainage (m). The position is
-    /// reliable.
+    /// No head is inside the tunnel, whose nearer end is at this chainage (m). The position is reliable.
     Outside(f64),
     /// No profiling head delivers readings.
     NoSonar,
     /// All wall here has passed, and the position is reliable: any speed is fine.
     Passed,
-    /// The vehicle is going back to this chainage (m) for a missed stretch, too fast for coverage. It passes
-    /// the stretch again from there.
+    /// The vehicle is going back to this chainage (m) too fast for coverage. From there it will pass a missed
+    /// stretch again.
     GoingBack(f64),
     /// No speed meets the target.
     NoSpeed,
     /// The speed is well over v_max.
     TooFast,
-    /// At this speed the present turn misses the target although the speed is within v_max.
+    /// The present turn misses the target although the speed is within v_max.
     TurnFails,
     /// Samples placed now can't be judged.
     CannotSay(PositionDoubt),
     /// The speed is slightly over v_max.
     Over,
-    /// At this speed position errors may make the present turn miss the target, although a faster speed would
-    /// meet it.
+    /// Position errors may make the present turn miss the target. A speed nearer to v_max would meet it.
     TurnUnsure,
     /// The speed is within v_max.
     Good,
@@ -54,11 +54,11 @@ pub enum Condition {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Lamp {
-    /// Continue.
+    /// Continue: all is well.
     Green,
     /// Take care.
     Amber,
-    /// Act.
+    /// Act now.
     Red,
 }
 
@@ -99,7 +99,7 @@ impl Condition {
 }
 
 impl LiveState {
-    /// Whether T forecast at the present speed is above this limit, m, or unbounded.
+    /// Whether the T forecast at the present speed is above this limit, m, or unbounded.
     fn turn_exceeds(&self, limit_m: f64) -> bool {
         self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)
     }
@@ -125,7 +125,7 @@ impl LiveState {
         let going_back = self.back_to_m.filter(|_| self.position == PositionState::Ok);
         let Some(v_max_mps) = self.v_max_mps() else {
             return match advice.reason {
-                // A head that isn't turning, or not long enough yet, gives no evidence.
+                // A head that isn't turning, or hasn't turned for long enough yet, gives no evidence.
                 Reason::NoReturns => Condition::NoSonar,
                 Reason::NoHeadingOrFix => Condition::NoPosition(NoFix::Heading),
                 Reason::AngularStep | Reason::HelixPitch => {
@@ -139,7 +139,7 @@ impl LiveState {
         }
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
-            // The forecast is latched for a second. The turn itself may already be better.
+            // The forecast is latched for a second. The present turn may already be better.
             _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => {
                 Condition::TurnFails
             }

@@ -1,7 +1,7 @@
-//! The live state as JSON: plain values with units in their names, ages against the tick, stale data marked.
+//! The live state as JSON. It has plain values with units in their names, ages up to the tick, and a mark on
+//! stale data.
 //!
-//! `docs/reference/live-state.schema.json` is its schema. Allocates: for outlets' threads, not for the
-//! loop's.
+//! `docs/reference/live-state.schema.json` is the schema. Allocates: outlets' threads only, never the loop's.
 
 use serde::Serialize;
 
@@ -17,15 +17,15 @@ pub struct LiveStateJson {
     pub version: u32,
     /// Time of publication, seconds on the log's clock.
     pub now_s: f64,
-    /// Time of the update that made it; `None` before the first.
+    /// Time of the update that made the state; `None` before the first update.
     pub at_s: Option<f64>,
-    /// Age at that time, seconds.
+    /// Age of the state at publication, seconds.
     pub age_s: Option<f64>,
-    /// Whether to show it as stale.
+    /// Whether the state is to be shown as stale.
     pub old: bool,
-    /// Most important condition, as a word.
+    /// Present condition, as a word.
     pub condition: &'static str,
-    /// Its colour.
+    /// Colour of the condition.
     pub lamp: Lamp,
     /// The position.
     pub position: PositionJson,
@@ -33,15 +33,15 @@ pub struct LiveStateJson {
     pub speed_mps: Option<f64>,
     /// Largest speed that meets the target, m/s; `None` if there is none.
     pub v_max_mps: Option<f64>,
-    /// Limiting factor of the speed; `None` before the first advice.
+    /// Reason that limits the speed; `None` before the first advice.
     pub reason: Option<&'static str>,
-    /// Distances to the limits, and margins.
+    /// Margins of speed and turn, part of the target that position errors take, and share of lost returns.
     pub margins: MarginsJson,
     /// Forecast of the present turn.
     pub turn: Option<TurnJson>,
     /// Every sensor, in the order of the vehicle file.
     pub sensors: Vec<SensorJson>,
-    /// Metres of the coverage extent by verdict. Their sum is `way_m`.
+    /// Metres of the coverage extent by verdict. `way_m` is their sum.
     pub metres: MetresJson,
     /// Last judged stretch without a verdict.
     pub cannot_say: Option<StretchJson>,
@@ -49,13 +49,13 @@ pub struct LiveStateJson {
     pub alerts: Vec<AlertJson>,
     /// Counts of the alerts that have not ended.
     pub alert_counts: AlertCountsJson,
-    /// Text of the setting that would allow more speed; `None` if there is none.
+    /// Text of the setting that would allow a higher speed; `None` if there is none.
     pub remedy: Option<String>,
-    /// Remaining cable, time and charge, as far as they are known.
+    /// Remaining cable, time and charge. An unknown amount is `None`.
     pub left: LeftJson,
-    /// Alerts, most urgent first, at most 64. A few ended ones come last.
+    /// Alerts, most urgent first, at most 64. A few ended alerts come last.
     pub alert_list: Vec<ListedAlertJson>,
-    /// Number of live alerts without room in `alert_list`.
+    /// Number of live alerts that have no room in `alert_list`.
     pub alerts_hidden: usize,
 }
 
@@ -66,7 +66,7 @@ pub struct PositionJson {
     pub state: &'static str,
     /// Reason for the state.
     ///
-    /// A doubtful position has `cable` or `spread`; a missing one `no_heading`, `no_chainage` or
+    /// A doubtful position has `cable` or `spread`. A missing one has `no_heading`, `no_chainage` or
     /// `no_place_in_section`.
     pub why: Option<&'static str>,
     /// Chainage, m.
@@ -79,24 +79,24 @@ pub struct PositionJson {
     pub place_sd_m: Option<f64>,
     /// Standard deviation of yaw, degrees.
     pub yaw_sd_deg: Option<f64>,
-    /// Standard deviation of one pass against the next, m; `None` without a position.
+    /// Standard deviation of the position of one pass relative to the next, m; `None` without a position.
     pub pass_sd_m: Option<f64>,
-    /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if unneeded.
+    /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if that isn't needed.
     pub stand_s: u32,
 }
 
-/// Distances to the limits, and margins.
+/// Margins of speed and turn, part of the target that position errors take, and share of lost returns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MarginsJson {
-    /// v_max less the speed, m/s; negative if too fast.
+    /// v_max minus the present speed, m/s; negative if the speed is too fast.
     pub speed_mps: Option<f64>,
-    /// Target less the T forecast for the present turn, m; negative if the turn fails.
+    /// Target minus the T forecast for the present turn, m; negative if the turn fails.
     pub turn_m: Option<f64>,
-    /// Part of the target taken by position errors, m.
+    /// Part of the target used up by position errors, m.
     ///
-    /// It is the confidence times the standard deviation of one pass against the next.
+    /// This is the confidence times the standard deviation of one pass relative to the next.
     pub position_m: Option<f64>,
-    /// Share of lost returns if they limit the speed, otherwise `None`.
+    /// Share of lost returns; `None` unless they limit the speed.
     pub lost_share: Option<f64>,
 }
 
@@ -107,7 +107,7 @@ pub struct TurnJson {
     pub target_m: f64,
     /// Forecast T, m; `None` if it is unbounded.
     pub predicted_t_m: Option<f64>,
-    /// Whether it will exceed the target.
+    /// Whether the forecast T will exceed the target.
     pub will_exceed: bool,
     /// Largest step along the wall, m.
     pub t_y_m: f64,
@@ -124,9 +124,9 @@ pub struct SensorJson {
     pub id: String,
     /// State.
     pub state: SensorState,
-    /// Age of its last reading, seconds; `None` if there is none.
+    /// Age of the sensor's last reading, seconds; `None` if there is none.
     pub age_s: Option<f64>,
-    /// Whether it is a profiling head.
+    /// Whether the sensor is a profiling head.
     pub is_head: bool,
 }
 
@@ -136,7 +136,7 @@ pub struct MetresJson {
     /// Metres by verdict.
     #[serde(flatten)]
     pub by_state: LiveMetres,
-    /// Sum of the metres.
+    /// Sum of the metres by verdict.
     pub way_m: f64,
 }
 
@@ -159,12 +159,12 @@ pub struct AlertJson {
     pub kind: &'static str,
     /// Id of the distrusted head.
     pub head: Option<String>,
-    /// Time at which it began, seconds on the log's clock.
+    /// Time at which the alert began, seconds on the log's clock.
     pub since_s: f64,
 }
 
 impl LiveState {
-    /// The state in JSON, with the alerts of the same dive: see
+    /// The state in JSON, with the alerts of the same dive. See
     /// [`Loop::live_state_json`](crate::run::Loop::live_state_json).
     pub fn json(&self, around: &TextContext<'_>, alerts: &AlertList) -> LiveStateJson {
         let TextContext { sources, section_m, .. } = *around;

@@ -12,7 +12,7 @@ fn status(state: &LiveState) -> PilotLine {
     status_line(state, &profile, &two(), &|source| ["sonar_0", "sonar_1", "tether"][source].to_owned())
 }
 
-/// States that cover everything shown.
+/// States that together show every part of the status.
 fn states() -> Vec<LiveState> {
     let good = test_state();
     let speed = |mps: f64| {
@@ -51,7 +51,7 @@ fn states() -> Vec<LiveState> {
 }
 
 #[test]
-fn status_at_60_columns_and_in_full() {
+fn status_line_in_full_and_at_60_columns() {
     let lines = |columns: usize| states().iter().map(|state| status(state).cut(columns)).collect::<Vec<_>>();
     let narrow = lines(60);
     assert!(narrow.iter().all(|line| line.chars().count() <= 60));
@@ -77,7 +77,7 @@ fn stretch(why: Unsure) -> UnsureStretch {
     }
 }
 
-/// A speed over the limit doesn't read like the limit.
+/// A speed over the limit must not read like the limit.
 #[test]
 fn speed_over_the_limit_reads_differently_from_it() {
     assert_eq!(speed_decimals(Some(0.104), Some(0.098)), 3);
@@ -86,9 +86,9 @@ fn speed_over_the_limit_reads_differently_from_it() {
     assert_eq!(speed_decimals(None, Some(0.1)), 2);
 }
 
-/// Slower isn't always better: below their planned speed the heads are out of phase.
+/// Slower isn't always better: below their planned speed, heads run out of phase.
 #[test]
-fn fitting_speed_helps_an_unsure_stretch() {
+fn remedy_for_an_unsure_stretch_depends_on_speed_and_phase() {
     let helps = |speed_mps: f64, fits_mps: f64, is_uneven: bool| {
         let driven = Driven { speed_mps, fits_mps, is_uneven, is_short: false };
         helps_text(&UnsureStretch { driven, ..stretch(Unsure::Position) })

@@ -17,29 +17,32 @@ pub struct AdviceReport {
     pub speed_mps: f64,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,
-    /// Speed below which heads apart along the hull run out of phase, m/s; zero if slower always helps.
+    /// Speed below which heads apart along the hull run out of phase, m/s; zero if a lower speed always
+    /// helps.
     pub from_mps: f64,
-    /// Speed nearest to the present one that meets the target, m/s, if the present one doesn't.
+    /// Of the speeds that meet the target, the one nearest to the present speed, m/s; `None` if the present
+    /// speed meets it.
     pub nearest_mps: Option<f64>,
     /// Limiting factor.
     pub reason: &'static str,
     /// T predicted at the present speed, m.
     pub predicted_t_m: Option<f64>,
-    /// At the present speed the present turn will exceed the target.
+    /// Whether the present turn will exceed the target at the present speed.
     pub will_exceed: bool,
-    /// Largest phase error of a head, degrees of its turn.
+    /// Largest phase error of a head, as an angle of its turn, degrees.
     pub phase_error_deg: Option<f64>,
     /// Hours at `v_max_mps` for the rest of the tunnel.
     pub needed_h: Option<f64>,
     /// Whether the remaining time is enough.
     pub suffices: Option<bool>,
-    /// Remedy if lower speed does not help: `centre`, `steady`, or a mode.
+    /// Remedy if a lower speed does not help: `centre`, `steady`, or a mode.
     pub remedy: Option<String>,
     /// Speeds possible in each mode of the heads.
     pub alternatives: Vec<AlternativeReport>,
-    /// Speed at which the present mode meets the target if the heads are restarted for it, m/s.
+    /// Speed at which the present mode meets the target if the heads are set in phase again for this speed,
+    /// m/s.
     pub start_anew_for_mps: Option<f64>,
-    /// Speed lost to each margin.
+    /// Largest speeds with the margins added one by one.
     pub margins: Option<MarginsReport>,
 }
 

@@ -1,4 +1,4 @@
-//! Whether a dive is an inspection at all, and the coverage extent of its verdicts.
+//! Whether a dive is an inspection at all, and the coverage extent.
 
 use serde::Serialize;
 
@@ -6,15 +6,17 @@ use crate::resources::{Coverage, Tally};
 use crate::run::Loop;
 use headrace_fusion::NoFix;
 
-/// Share of a dive's pings without a position above which its verdicts are no inspection.
+/// Largest share of pings without a position in an inspection. With a larger share, the dive's verdicts mean
+/// nothing.
 const MOST: f64 = 0.5;
 
-/// Coverage extent: whole sections of tunnel in which the vehicle or its heads, pinging or not, have been.
+/// Coverage extent: whole sections of tunnel in which the vehicle or its heads have been, whether the heads
+/// pinged or not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CoverageExtentReport {
-    /// Beginning of its first section, m; `None` without a position.
+    /// Beginning of the extent's first section, m; `None` without a position.
     pub from_m: Option<f64>,
-    /// End of its last section, m.
+    /// End of the extent's last section, m.
     pub to_m: Option<f64>,
     /// Length, m: the sum of the metres by verdict.
     pub length_m: f64,
@@ -25,7 +27,7 @@ pub struct CoverageExtentReport {
 pub struct NotInspectedReport {
     /// `no_sonar`, `no_position`, `outside_tunnel` or `mostly_no_position`.
     pub reason: &'static str,
-    /// Most frequent missing requirement of returns without a position.
+    /// Requirement that was missing most often for returns without a position.
     ///
     /// One of `no_heading`, `no_chainage` and `no_place_in_section`.
     pub lacking: Option<&'static str>,

@@ -45,9 +45,9 @@ pub const REPORT_VERSION: u32 = 7;
 pub struct Report {
     /// Version of this schema.
     pub report_version: u32,
-    /// Reason for which the dive is no inspection; `None` if it is one.
+    /// Reason for which the dive is no inspection; `None` if the dive is an inspection.
     pub not_inspected: Option<NotInspectedReport>,
-    /// Log that the dive was read from or written to, if any.
+    /// Log that the dive was read from or written to; `None` without a log.
     pub log: Option<LogReport>,
     /// Digest of all results, 16 hexadecimal digits.
     pub digest: String,
@@ -55,17 +55,17 @@ pub struct Report {
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Confidence: standard deviations of the hole by which a pass or a fail must clear the target.
+    /// Confidence: number of standard deviations of the hole by which a pass or a fail must clear the target.
     pub confidence_sd: u32,
-    /// Coverage extent: the metres that the verdicts cover.
+    /// Coverage extent: the part of the tunnel that the metres by verdict cover.
     pub way: CoverageExtentReport,
     /// The dive as a whole.
     pub dive: DiveReport,
-    /// Metres by verdict, and the spacings over all sections.
+    /// Metres by verdict, and spacings over all sections.
     pub summary: SummaryReport,
     /// Every section of the coverage extent, in the order of chainage.
     pub sections: Vec<SectionReport>,
-    /// Neighbouring flagged sections, by their stable number.
+    /// Runs of neighbouring flagged sections, in the order of their numbers.
     pub runs: Vec<RunReport>,
     /// Stretches that neither pass nor fail although no more samples will come, in the order of chainage.
     pub unsure: Vec<UnsureReport>,
@@ -75,7 +75,7 @@ pub struct Report {
     pub survey: SurveyReport,
     /// Metres by verdict for the additional targets and section lengths requested.
     pub what_if: Vec<OtherTargetReport>,
-    /// Names of the heads and their alternative settings, for its text.
+    /// Names of the heads and their alternative settings, for the report as text.
     #[serde(skip)]
     pub heads: HeadDescriptions,
     /// Declared openings of the wall, excluded from verdicts.
@@ -90,15 +90,15 @@ pub struct Report {
     pub notes: Vec<NoteJson>,
     /// Number of notes left out for lack of room.
     pub notes_dropped: u32,
-    /// Traffic of the operator's input; `None` if there was none.
+    /// Traffic of the operator's input; `None` without any.
     pub console: Option<ConsoleReport>,
     /// Advice history.
     pub advice: Vec<AdviceReport>,
-    /// Advice entries dropped for lack of room.
+    /// Number of advice entries dropped for lack of room.
     pub advice_dropped: u64,
     /// Traffic of each source.
     pub sources: Vec<SourceReport>,
-    /// Changes by smoothing; `None` without smoothing.
+    /// Effect of smoothing on the verdicts; `None` without smoothing.
     pub smoothing: Option<SmoothingReport>,
 }
 
@@ -107,15 +107,15 @@ pub struct Report {
 pub struct LogReport {
     /// Path as given.
     pub path: String,
-    /// SHA-256, hexadecimal; for a recording in parts, of the parts' concatenated bytes.
+    /// SHA-256, hexadecimal. For a recording in parts, it is that of the concatenated parts.
     pub sha256: String,
-    /// Messages of sources.
+    /// Number of messages from sources.
     pub messages: u64,
-    /// Losses in plain text, each with its time span.
+    /// Losses in plain text. Each text has the time span of the loss.
     pub losses: Vec<String>,
-    /// Irregularities and their handling, in plain text; no data were lost by them.
+    /// Irregularities and how they were handled, in plain text. They lost no data.
     pub notes: Vec<String>,
-    /// Its files in order, for a recording in parts.
+    /// Files of a recording in parts, in order.
     pub parts: Vec<PartReport>,
 }
 
@@ -126,24 +126,24 @@ pub struct PartReport {
     pub path: String,
     /// SHA-256, hexadecimal.
     pub sha256: String,
-    /// Messages of sources.
+    /// Number of messages from sources.
     pub messages: u64,
 }
 
 /// The dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiveReport {
-    /// First to last packet, seconds.
+    /// Time from the first to the last packet, seconds.
     pub duration_s: f64,
-    /// First packet on the log's clock, seconds.
+    /// Time of the first packet on the log's clock, seconds.
     pub start_s: f64,
-    /// Minimum chainage that any head's reach covered, m.
+    /// Smallest chainage reached by any head, m.
     pub from_m: Option<f64>,
-    /// Maximum chainage that any head's reach covered, m.
+    /// Largest chainage reached by any head, m.
     pub to_m: Option<f64>,
-    /// Distance between them, m.
+    /// Distance between the two chainages, m.
     pub distance_m: f64,
-    /// Whether any profiling head pinged; if not, there is no coverage.
+    /// Whether any profiling head pinged. If none did, there is no coverage.
     pub sonar: bool,
     /// Minimum speed of sound used for ranges, m/s.
     pub sound_speed_least_mps: f64,
@@ -151,7 +151,7 @@ pub struct DiveReport {
     pub sound_speed_most_mps: f64,
     /// Samples on the wall.
     pub samples_valid: u64,
-    /// Valid samples dropped by thinning of full cells.
+    /// Valid samples dropped because their cells were full.
     pub samples_thinned: u64,
     /// Pings without a sample, by reason.
     pub samples_rejected: RejectedReport,
@@ -164,15 +164,15 @@ pub struct RejectedReport {
     pub missing: u64,
     /// No return because the wall was out of range.
     pub out_of_range: u64,
-    /// Occluded by the vehicle.
+    /// The beam was occluded by the vehicle.
     pub occluded: u64,
-    /// A return without a fix.
+    /// The return came without a fix.
     pub no_fix: u64,
-    /// Beyond the ends of the tunnel.
+    /// The sample lay beyond the ends of the tunnel.
     pub outside: u64,
     /// The sample store was full.
     pub not_stored: u64,
-    /// Returns that were not accepted as wall.
+    /// The return was not accepted as wall.
     pub doubtful_returns: u64,
 }
 
@@ -212,9 +212,9 @@ pub struct OpeningReport {
     pub from_m: f64,
     /// End, m.
     pub to_m: f64,
-    /// Arc length of its beginning, m; `None` for the whole perimeter.
+    /// Arc length at which the opening begins, m; `None` for the whole perimeter.
     pub arc_from_m: Option<f64>,
-    /// Its length along the perimeter, m; `None` for the whole perimeter.
+    /// Length of the opening along the perimeter, m; `None` for the whole perimeter.
     pub arc_length_m: Option<f64>,
 }
 
@@ -224,18 +224,20 @@ pub struct AlertReport {
     /// `outside_tunnel`, `profile_contradicted`, `head_scattered`, `head_constant`, `head_outvoted`, `cable_doubted` or
     /// `setting_doubted`.
     pub kind: &'static str,
-    /// Time of its first occurrence, seconds on the log's clock.
+    /// Time of the alert's first occurrence, seconds on the log's clock.
     pub since_s: f64,
     /// Number of occurrences.
     ///
-    /// They are samples, judgements of sections, or times that a head or the cable counter was distrusted.
+    /// An occurrence is a sample outside the tunnel, a judgement of a contradicting section, or the beginning
+    /// of distrust in a head or the cable counter.
     pub count: u64,
-    /// Chainage of its first occurrence, m.
+    /// Chainage of the alert's first occurrence, m.
     pub x_m: f64,
-    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    /// Largest deviation, m.
     ///
-    /// For a head: mean between successive returns, constant range, or mean deviation from the design. For
-    /// the cable counter: the largest difference from the other source. For a setting: 0.
+    /// Outside the tunnel: distance from its end. Contradicted profile: mean deviation of a section from the
+    /// design. Head: mean difference between successive returns, constant range, or mean deviation from the
+    /// design. Cable counter: difference from the other source. Setting: 0.
     pub worst_m: f64,
     /// Id of the distrusted head, or of the velocity log that the cable counter differs from.
     pub head: Option<String>,
@@ -248,7 +250,7 @@ pub struct AlertReport {
 pub struct ConsoleReport {
     /// Number of packets.
     pub packets: u64,
-    /// Number of packets that are no command.
+    /// Number of packets that are not a command.
     pub invalid: u64,
     /// Number of commands without effect.
     pub without_effect: u64,
@@ -259,22 +261,22 @@ pub struct ConsoleReport {
 pub struct SettingReport {
     /// `range_scale`, `head_turned`, `head_pitched`, `head_yawed`, `wrong_way_round` or `swapped`.
     pub what: &'static str,
-    /// Name of the source; `None` if the setting belongs to no single one.
+    /// Name of the source; `None` if no single source has the setting.
     pub source: Option<String>,
-    /// Name of the source that it is swapped with.
+    /// Name of the other source, for two swapped sources.
     pub other: Option<String>,
-    /// Ratio of measured ranges to the design's; `None` for other settings.
+    /// Ratio of measured ranges to those of the design; `None` for other settings.
     pub range_ratio: Option<f64>,
-    /// Angle to be added to that in the vehicle file, degrees; `None` for other settings.
+    /// Angle to be added to the angle in the vehicle file, degrees; `None` for other settings.
     ///
-    /// The head is turned about its axis, pitched or yawed by it.
+    /// It is an angle about the head's axis, a pitch or a yaw.
     pub angle_deg: Option<f64>,
-    /// Number of standard deviations from the correct value.
+    /// Difference from the correct value, in standard deviations.
     pub sure_ratio: f64,
 }
 
 impl Report {
-    /// Report of a loop's results so far.
+    /// Creates the report of a loop's results so far.
     pub fn of(dive: &Loop) -> Self {
         let (coverage, tally, log) = (dive.coverage(), dive.tally(), dive.advice_log());
         let sections = &coverage.sections;
@@ -334,7 +336,7 @@ impl Report {
         }
     }
 
-    /// Whether any received data were lost before the results.
+    /// Whether any received data were lost before they gave results.
     pub fn lost_data(&self) -> bool {
         let rejected = &self.dive.samples_rejected;
         let dropped =
@@ -350,7 +352,7 @@ impl SummaryReport {
     }
 }
 
-/// Alerts kept, as of the end.
+/// Alerts that the list still keeps, as of the end of the dive.
 fn listed(dive: &Loop) -> Vec<ListedAlertJson> {
     let around = dive.surroundings();
     let now = dive.tally().span.map_or(MonoNs(0), |(_, last)| last);
@@ -362,7 +364,7 @@ fn console_report(counts: ConsoleCounts) -> Option<ConsoleReport> {
     (packets > 0).then_some(ConsoleReport { packets, invalid, without_effect })
 }
 
-/// Confidence as a whole number, as it is configured.
+/// Confidence as a whole number, like the setting.
 fn confidence(confidence_sd: f64) -> u32 {
     u32::try_from(headrace_geometry::math::round_to_i64(confidence_sd)).unwrap_or(0)
 }

@@ -12,58 +12,61 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 /// Neighbouring flagged sections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
-    /// Stable number.
+    /// Number of the run, which never changes.
     pub id: u32,
-    /// Main cause: that of most of its sections.
+    /// Main cause: that of most sections of the run.
     pub cause: Cause,
-    /// All causes of its sections: the main one, then the others by frequency.
+    /// All causes of the run's sections: first the main one, then the others by frequency.
     pub causes: Vec<Cause>,
-    /// Figures of the causes named in its text, each from a section that has it.
+    /// Figures for the causes that the text names. Each comes from a section with that cause.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
-    /// Ids of the sources of silent heads in the section with the largest hole, or where silence is the
-    /// cause.
+    /// Source ids of the silent heads. They are those of the section with the largest hole, or of the section
+    /// that represents silence as a cause.
     pub silent_sources: Vec<String>,
     /// Beginning, m.
     pub start_m: f64,
     /// End, m.
     pub end_m: f64,
-    /// Metres of it that fail.
+    /// Metres of the run that fail.
     pub failed_m: f64,
-    /// Largest hole, m; the last one before it was cleared.
+    /// Diameter of the largest hole, m. In a cleared run, the diameter before the run was cleared.
     pub hole_m: f64,
     /// Chainage of that hole's centre, m.
     pub hole_x_m: f64,
-    /// Clock position of that centre, looking along the tunnel.
+    /// Clock position of the hole's centre, looking along the tunnel.
     pub hole_clock: String,
-    /// Time of its first flag, seconds on the log's clock.
+    /// Time of the run's first flag, seconds on the log's clock.
     pub raised_s: f64,
-    /// Time from which none of its sections fails, seconds on the log's clock.
+    /// Time at which the last section of the run ceased to fail, seconds on the log's clock.
     pub cleared_s: Option<f64>,
-    /// Run that it was merged into.
+    /// Number of the run into which this run was merged.
     pub merged_into: Option<u32>,
 }
 
 /// A stretch to pass again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReturnReport {
-    /// Number of its run.
+    /// Number of the run in this stretch.
     pub run: u32,
-    /// Chainage of its far end, m.
+    /// Chainage of the stretch's far end, m.
     pub from_m: f64,
-    /// Chainage of its near end, m.
+    /// Chainage of the stretch's near end, m.
     pub to_m: f64,
-    /// Chainage for the vehicle's origin to go back to, m.
+    /// Chainage to which the vehicle's origin has to go back, m.
     ///
-    /// From there all heads pass the stretch from its far end on or back.
+    /// On the way from there, all heads pass the whole stretch.
     pub back_to_m: f64,
     /// Action against the main cause.
     pub action: Action,
     /// All actions, in the order of the run's causes.
     pub actions: Vec<Action>,
-    /// Maximum speed then, m/s: the planned one if that meets the target; zero if no speed does in this mode.
+    /// Maximum speed for passing again, m/s.
+    ///
+    /// It is the planned speed if that meets the target. It is zero if no speed meets the target in this
+    /// mode.
     pub at_most_mps: f64,
-    /// Duration at that speed, seconds; for two passes if the vehicle has to roll to each side.
+    /// Duration at that speed, seconds. It includes a second pass if the vehicle has to roll to each side.
     pub takes_s: Option<f64>,
 }
 
@@ -97,20 +100,21 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
         .collect()
 }
 
-/// Metres of a run's sections that fail at present. A flag remains on a section that no longer gets a
-/// verdict.
+/// Metres of a run's sections that fail at present.
+///
+/// A section may keep its flag although it no longer has a verdict. Such sections don't count.
 fn failed_m(sections: &Sections, run: &Run) -> f64 {
     let fails = |index: &i64| sections.get(*index).is_some_and(|section| section.verdict == Verdict::Fail);
     (run.from..run.to).filter(fails).count() as f64 * sections.section_m()
 }
 
-/// Ids of the heads' sources, by number of the head.
+/// Source ids of the heads, by number of the head.
 fn head_ids(dive: &Loop) -> Vec<String> {
     let is_head = |(_, sensor): &(&SourceInfo, SensorInfo)| sensor.kind == SensorKind::Head;
     dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
-/// Stretches to pass again by the present verdicts: open runs, from the far end to the portal.
+/// Stretches to pass again by the present verdicts: all open runs, from the far end to the portal.
 pub fn way_home(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());

@@ -14,15 +14,15 @@ pub struct SectionReport {
     pub start_m: f64,
     /// End, m.
     pub end_m: f64,
-    /// Diameter of its largest hole, m; `None` if it wasn't measured.
+    /// Diameter of the section's largest hole, m; `None` if the hole wasn't measured.
     pub hole_m: Option<f64>,
-    /// Lower bound of the hole, m: thinned samples may have divided it.
+    /// Lower bound of the diameter, m. Samples that were dropped may have divided the hole.
     pub hole_least_m: Option<f64>,
-    /// Upper bound of the hole, m; `None` if unbounded.
+    /// Upper bound of the diameter, m; `None` if unbounded.
     pub hole_most_m: Option<f64>,
-    /// False if there are no samples around it: the hole is then at least `hole_m`.
+    /// Whether there are samples around the hole. If not, the diameter is at least `hole_m`.
     pub hole_bounded: bool,
-    /// Standard deviation of the hole, m.
+    /// Standard deviation of the diameter, m.
     pub hole_sd_m: f64,
     /// Chainage of the hole's centre, m.
     pub hole_x_m: Option<f64>,
@@ -37,30 +37,32 @@ pub struct SectionReport {
     pub t_y: SpreadReport,
     /// Lattice diagonal.
     pub t: SpreadReport,
-    /// Samples on it.
+    /// Number of samples on the section's wall.
     pub samples: u32,
     /// Samples per square metre of wall.
     pub density_perm2: f64,
-    /// Deviation of its wall from the design profile; `None` without samples.
+    /// Deviation of the section's wall from the design profile; `None` without samples.
     pub deviation: Option<DeviationReport>,
-    /// Share of its wall that is a declared opening.
+    /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
     /// `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
-    /// Open, and further driving won't change it: not all heads have passed where the vehicle began or turned
-    /// back.
+    /// Whether the section is open although further driving won't change it.
+    ///
+    /// The vehicle began or turned back there, so not all heads have passed the section.
     pub not_inspected: bool,
     /// Reason for `cannot_say`; `None` with other verdicts.
     pub cannot_say: Option<&'static str>,
-    /// Cause, while the verdict is `fail`.
+    /// Evidence for the cause; `None` unless the verdict is `fail`.
     pub cause: Option<Evidence>,
-    /// Time of its flag, seconds on the log's clock.
+    /// Time at which the section was flagged, seconds on the log's clock.
     pub flagged_s: Option<f64>,
     /// Time at which a later pass cleared the flag.
     pub cleared_s: Option<f64>,
-    /// Returns on its wall that were not accepted as wall.
+    /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful_returns: u32,
-    /// Whether it holds samples of a head that was distrusted soon after; it can't pass.
+    /// Whether the section has samples of a head that was distrusted soon afterwards. Such a section can't
+    /// pass.
     pub suspect: bool,
 }
 

@@ -1,17 +1,17 @@
-//! Changes by smoothing: plain values.
+//! Effect of smoothing on the verdicts, as plain values.
 
 use serde::Serialize;
 
-/// Verdicts of a dive by the filter alone, compared with those of the smoothed dive.
+/// Verdicts of a dive with the trajectory of the filter alone, compared with those after smoothing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmoothingReport {
-    /// Digest of the results by the filter alone.
+    /// Digest of the results with the filter alone.
     pub filter_digest: String,
-    /// Estimates that were smoothed.
+    /// Number of estimates that were smoothed.
     pub estimates: u64,
-    /// Contiguous pieces of the trajectory.
+    /// Number of contiguous pieces of the smoothed trajectory.
     pub pieces: u64,
-    /// Metres by verdict by the filter alone.
+    /// Metres by verdict with the filter alone.
     pub before: MetresReport,
     /// Metres by verdict after smoothing.
     pub after: MetresReport,
@@ -41,7 +41,7 @@ pub struct ChangeReport {
     pub start_m: f64,
     /// End, m.
     pub end_m: f64,
-    /// Verdict by the filter alone; `None` if no head passed the section on its trajectory.
+    /// Verdict with the filter alone; `None` if no head passed the section on its trajectory.
     pub before: Option<JudgedReport>,
     /// Verdict after smoothing; `None` if no head passed the section on the smoothed trajectory.
     pub after: Option<JudgedReport>,
@@ -52,8 +52,8 @@ pub struct ChangeReport {
 pub struct JudgedReport {
     /// `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
-    /// Diameter of the largest hole, m; `None` if it wasn't measured.
+    /// Diameter of the largest hole, m; `None` if the hole wasn't measured.
     pub hole_m: Option<f64>,
-    /// Its standard deviation, m.
+    /// Standard deviation of the diameter, m.
     pub hole_sd_m: f64,
 }

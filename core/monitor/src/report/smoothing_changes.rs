@@ -1,10 +1,10 @@
-//! Compares the report of a smoothed dive with that by the filter alone.
+//! Compares the report of a smoothed dive with the report of the same dive by the filter alone.
 
 use super::sections::SectionReport;
 use super::smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 use super::{Report, SummaryReport};
 
-/// Compares the filter's report with the smoothed one, made of `estimates` estimates in `pieces` contiguous
+/// Compares the filter's report with the report after smoothing `estimates` estimates in `pieces` contiguous
 /// pieces.
 pub fn compare(filter: &Report, smoothed: &Report, estimates: u64, pieces: u64) -> SmoothingReport {
     SmoothingReport {
@@ -27,7 +27,9 @@ fn judged(section: &SectionReport) -> JudgedReport {
     JudgedReport { verdict, hole_m, hole_sd_m }
 }
 
-/// Both lists are in the order of chainage. Either may have sections that are missing in the other.
+/// Lists the sections whose verdict differs.
+///
+/// Both inputs are in the order of chainage. Either may have sections that the other lacks.
 fn changes(before: &[SectionReport], after: &[SectionReport]) -> Vec<ChangeReport> {
     let (mut before, mut after) = (before.iter().peekable(), after.iter().peekable());
     let mut changed = Vec::new();

@@ -13,61 +13,64 @@ pub struct SourceReport {
     pub id: String,
     /// Kind of device.
     pub plugin: String,
-    /// Packets.
+    /// Number of packets.
     pub packets: u64,
-    /// Frames that were whole and valid.
+    /// Number of whole and valid frames.
     pub frames: u64,
-    /// Candidate frames that failed.
+    /// Number of candidate frames that failed the check.
     pub bad_frames: u64,
-    /// Bytes that belong to no valid frame.
+    /// Number of bytes that belong to no valid frame.
     pub skipped_bytes: u64,
-    /// Readings decoded from them.
+    /// Number of readings decoded from the frames.
     pub readings: u64,
-    /// Readings understood but not used: a bad status, another range setting, no calibration, a jump.
+    /// Number of readings decoded but not used.
+    ///
+    /// The reason is a bad status, another range setting, a missing calibration or a jump.
     pub withheld: u64,
     /// Longest silence between two packets, seconds.
     pub longest_gap_s: f64,
-    /// Time from its last packet to the dive's last reading, seconds; `None` without packets.
+    /// Time from the source's last packet to the dive's last reading, seconds; `None` without packets.
     pub silent_at_end_s: Option<f64>,
     /// Packets per second.
     pub rate_hz: f64,
-    /// Device clock statistics; `None` if it sends no timestamps.
+    /// Device clock statistics; `None` if the source sends no timestamps.
     pub device_clock: Option<DeviceClockReport>,
-    /// Innovation statistics in navigation; `None` without a filter, or if the filter doesn't use it.
+    /// Innovation statistics in navigation; `None` without a filter, or if the filter doesn't use the source.
     pub navigation: Option<NavigationReport>,
-    /// Connection statistics; `None` if its bytes didn't come from a port.
+    /// Connection statistics; `None` if the source's bytes didn't come from a port.
     pub line: Option<LineReport>,
 }
 
 /// Connection statistics of a sensor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LineReport {
-    /// Number of times it was opened.
+    /// Number of times the connection was opened.
     pub opened: u64,
-    /// Number of times it was lost, or closed after a silence timeout.
+    /// Number of times the connection was lost, or closed after a silence timeout.
     pub lost: u64,
-    /// Packets dropped unread, for lack of room or by the carrier.
+    /// Number of packets dropped before they were read, for lack of room or by the network.
     pub dropped_packets: u64,
-    /// Messages of senders other than the device, which were not used.
+    /// Number of messages from senders other than the device. They were not used.
     pub strangers: u64,
-    /// Final status, in plain text.
+    /// Final status of the connection, in plain text.
     pub status: String,
 }
 
-/// A source's device clock compared with the program's. For information only: readings are timed by the
-/// receive time.
+/// Comparison of a source's device clock with the program's clock.
+///
+/// For information only: the receive time of a packet gives the time of its readings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceClockReport {
-    /// Timestamps received.
+    /// Number of timestamps received.
     pub stamps: u64,
-    /// Number of times it restarted or fell behind.
+    /// Number of times the device clock restarted or fell behind.
     pub restarts: u64,
-    /// Number of times it jumped ahead.
+    /// Number of times the device clock jumped ahead.
     pub jumps: u64,
-    /// Time on its clock over which the drift is estimated, seconds.
+    /// Time on the device clock over which the drift is estimated, seconds.
     pub span_s: f64,
-    /// Drift, parts per million; positive if it gains on the program's clock. `None` until there are enough
-    /// data.
+    /// Drift, parts per million; positive if the device clock gains on the program's clock. `None` until
+    /// there are enough data.
     pub drift_ppm: Option<f64>,
     /// Standard deviation of the drift, parts per million.
     pub drift_sd_ppm: Option<f64>,
@@ -89,13 +92,13 @@ impl From<ClockReport> for DeviceClockReport {
 /// Innovation statistics of a source in navigation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NavigationReport {
-    /// Scalar measurements used.
+    /// Number of scalar measurements used.
     pub used: u64,
-    /// Scalar measurements rejected by the gate.
+    /// Number of scalar measurements rejected by the gate.
     pub gated: u64,
-    /// Readings that came too late.
+    /// Number of readings that came too late.
     pub late: u64,
-    /// Readings with impossible values, or dropped for lack of room.
+    /// Number of readings with impossible values, or dropped for lack of room.
     pub dropped: u64,
     /// Mean normalised innovation squared (NIS): about 1 if the noise settings are right.
     pub nis: Option<f64>,

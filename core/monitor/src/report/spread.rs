@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use headrace_coverage::Spread;
 
-/// Count, mean, deviation and extremes; `None` without values.
+/// Count, mean, standard deviation and extremes. All except the count are `None` without values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpreadReport {
     /// Number of values.

@@ -1,4 +1,4 @@
-//! Soundings by node in the report.
+//! Soundings by node of a survey grid, in the report.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::resources::Coverage;
 use headrace_coverage::soundings::ENOUGH;
 use headrace_geometry::tunnel::Profile;
 
-/// Samples by node of a square grid over the sections that were passed.
+/// Samples by node of a square grid over the passed sections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SurveyReport {
     /// Edge of a node along the tunnel, m.
@@ -15,11 +15,11 @@ pub struct SurveyReport {
     pub around_m: f64,
     /// Minimum samples per node.
     pub enough: u16,
-    /// Nodes passed.
+    /// Number of nodes passed.
     pub nodes: u32,
-    /// Share of these nodes with enough samples; `None` without nodes.
+    /// Share of the passed nodes that have enough samples; `None` without nodes.
     pub enough_share: Option<f64>,
-    /// Nodes without a sample.
+    /// Number of nodes without a sample.
     pub empty: u32,
     /// Node counts by row along the tunnel.
     pub rows: Vec<NodeRowReport>,
@@ -32,26 +32,26 @@ pub struct SurveyReport {
 pub struct NodeRowReport {
     /// Beginning, m.
     pub start_m: f64,
-    /// Its nodes.
+    /// Number of nodes in the row.
     pub nodes: u32,
-    /// Nodes with enough samples.
+    /// Number of nodes with enough samples.
     pub enough: u32,
-    /// Nodes without any sample.
+    /// Number of nodes without any sample.
     pub empty: u32,
 }
 
 /// A node without a sample.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HolidayReport {
-    /// Chainage of its centre, m.
+    /// Chainage of the node's centre, m.
     pub x_m: f64,
-    /// Arc length of its centre, m.
+    /// Arc length of the node's centre, m.
     pub arc_m: f64,
-    /// Clock position of its centre.
+    /// Clock position of the node's centre.
     pub clock: String,
 }
 
-/// Maximum number of empty nodes listed; `empty` counts them all.
+/// Maximum number of empty nodes listed. The field `empty` counts all of them.
 const LISTED: usize = 1000;
 
 pub(super) fn survey(coverage: &Coverage, profile: &Profile) -> SurveyReport {

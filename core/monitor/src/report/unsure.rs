@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::live_messages::UnsureStretch;
 use crate::resources::Coverage;
 
-/// Neighbouring sections that neither pass nor fail for the same reason although no more samples will come.
+/// Neighbouring sections that neither pass nor fail, for the same reason, although no more samples will come.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UnsureReport {
     /// Reason: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`,
@@ -15,13 +15,13 @@ pub struct UnsureReport {
     pub start_m: f64,
     /// End, m.
     pub end_m: f64,
-    /// Metres of it that are unsure.
+    /// Metres of the stretch that are unsure.
     pub unsure_m: f64,
     /// Largest hole, m.
     pub hole_m: f64,
     /// Standard deviation of that hole, m.
     pub hole_sd_m: f64,
-    /// The stretch, for its text.
+    /// The stretch, for the report as text.
     #[serde(skip)]
     pub stretch: UnsureStretch,
 }

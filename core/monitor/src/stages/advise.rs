@@ -13,10 +13,11 @@ use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 
-/// Minimum speed for which heads apart along the hull are assumed to follow each other, m/s.
+/// Minimum speed assumed for heads apart along the hull, m/s. It limits the time between their visits of a
+/// place.
 const SLOWEST_MPS: f64 = 0.05;
 
-/// The advisor, and the time limit of the dive from its first packet.
+/// The advisor, and the maximum duration of the dive from its first packet.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct Advisor {
     pub(crate) advisor: advice::Advisor,
@@ -28,12 +29,13 @@ pub(crate) struct Advisor {
 stateful!(Advisor { state: advisor, looks, hysteresis; fixed: dive_time; });
 
 impl Advisor {
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory of the advisor.
     pub(crate) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
-    /// Fills the advice for each update of a tick, in order. `begun` is the receive time of the first packet.
+    /// Computes the advice for each update of a tick, in order. `begun` is the receive time of the first
+    /// packet.
     pub(crate) fn fill(&mut self, placed: &[Placed], begun: Option<MonoNs>, list: &mut Vec<Advice>) {
         list.clear();
         for item in placed {
@@ -47,8 +49,8 @@ impl Advisor {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let was_astern = self.advisor.is_astern();
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
-        // On the way back, heads apart along the hull are in phase at other speeds, which become invalid when
-        // the vehicle turns round.
+        // On the way back, heads apart along the hull are in phase at other speeds. Advice from before the
+        // vehicle turned round is no longer valid.
         if self.advisor.is_astern() != was_astern {
             self.hysteresis.forget();
         }
@@ -56,7 +58,7 @@ impl Advisor {
     }
 }
 
-/// Swing of the vehicle between two passes.
+/// Rotation of the vehicle between two passes.
 fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
     if let Some(pose) = situation.pose {
         looks.keep(at, pose.attitude * Vec3::new(1.0, 0.0, 0.0));
@@ -86,7 +88,9 @@ fn digest(stream: &mut ResultStream, at: MonoNs, advice: &Advice) {
     }
 }
 
-/// Computes the advice for each update. Without an advisor it has come with the tick: see [`crate::split`].
+/// Computes the advice for each update.
+///
+/// Without an advisor, the advice has come with the tick: see [`crate::split`].
 pub(super) fn find(
     placed: Res<'_, PlacedList>,
     tally: Res<'_, Tally>,
@@ -132,7 +136,7 @@ mod tests {
         MonoNs(0) + DurNs::from_secs_f64(seconds)
     }
 
-    /// Two heads that turn in 8 s, this far apart along the hull, m.
+    /// Two heads that turn in 8 s. Along the hull they are this far apart, m.
     fn two_heads(apart_m: f64) -> Situation {
         let mut situation = Situation { configured: 2, ..situation(Some(5.0)) };
         for (number, slot) in situation.heads.iter_mut().take(2).enumerate() {
@@ -179,10 +183,10 @@ mod tests {
         assert_eq!(left_s(Some(100.0), None), [None, None], "the dive hasn't begun");
     }
 
-    /// A vehicle that yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. Heads 0.8 m apart reach a
-    /// place 8 s after one another at 0.1 m/s.
+    /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, heads 0.8 m apart
+    /// reach the same place 8 s after one another.
     #[test]
-    fn swing_covers_passes_and_heads_apart_along_the_hull() {
+    fn swing_covers_the_time_between_passes_and_between_heads_along_the_hull() {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();
@@ -195,7 +199,7 @@ mod tests {
             }
             last
         };
-        // Accurate to one update.
+        // The tolerance is one update.
         let near = |found: f64, expected: f64| (found - expected).abs() < 0.05 * expected;
         for (apart_m, speed_mps) in [(0.8, 0.1), (0.8, -0.1), (0.8, 0.2)] {
             let found = swung(apart_m, speed_mps);
@@ -203,8 +207,8 @@ mod tests {
         }
         let side_by_side = swung(0.0, 0.1);
         assert!(near(side_by_side.rate_radps, 0.01) && side_by_side.apart_rate_radps.abs() <= 0.0);
-        // A stationary vehicle is assumed to move at 0.05 m/s, which takes 16 s. Only the last half minute
-        // counts.
+        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the heads are 16 s apart. Only the last
+        // half minute counts.
         let at_rest = swung(0.8, 0.0);
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }

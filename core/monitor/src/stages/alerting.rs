@@ -23,24 +23,24 @@ pub(crate) struct Alerting<'a> {
     pub(crate) notices: &'a mut Notices,
     pub(crate) stream: &'a mut ResultStream,
     pub(crate) events: &'a [Event],
-    /// Numbers of runs, commands and events already applied.
+    /// Numbers of runs, commands and events applied so far.
     pub(crate) taken: (usize, usize, usize),
 }
 
 impl Alerting<'_> {
-    /// Applies everything before the update that precedes the event with this index.
+    /// Applies everything that comes before the update that precedes the event with this index.
     pub(crate) fn before(&mut self, event: usize, state: &mut LiveState) {
         self.until(Some(event), state);
         self.hear(state, event);
     }
 
-    /// Applies an update, after everything before it.
+    /// Applies an update. Everything before it must have been applied.
     pub(crate) fn beat(&mut self, beat: &Beat<'_>) {
         let mut to = Telling { notices: self.notices, stream: self.stream };
         self.list.beat(beat, &mut to);
     }
 
-    /// Applies the rest of the tick. `state` is as of the last update.
+    /// Applies the rest of the tick. `state` is the live state of the last update.
     pub(crate) fn rest(&mut self, state: &mut LiveState) {
         self.until(None, state);
         self.hear(state, self.events.len());
@@ -56,8 +56,9 @@ impl Alerting<'_> {
         self.taken.2 = until.max(self.taken.2);
     }
 
-    /// Applies runs and commands up to an update, or all. A command precedes the results of the event after
-    /// it.
+    /// Applies runs and commands up to an update, or all.
+    ///
+    /// A command comes before the results of the event that follows it.
     fn until(&mut self, beat: Option<usize>, state: &mut LiveState) {
         loop {
             let run = self.runs.0.get(self.taken.0);
@@ -174,8 +175,8 @@ mod tests {
 
     const NOW: MonoNs = MonoNs(9_000_000_000);
 
-    /// The run of a section without a sample, raised at the event with this index, or at the update before
-    /// it.
+    /// The run of a section without samples. It is raised at the event with this index, or at the update
+    /// before that event.
     fn run(event: usize, at_beat: bool) -> RunInput {
         let profile = shapes::circle(3.0).unwrap();
         let perimeter_m = profile.perimeter_m();
@@ -203,7 +204,7 @@ mod tests {
         RunInput::of((event, at_beat), NOW, told.unwrap(), &sections).unwrap()
     }
 
-    /// Inputs of a tick: a run, a command that acknowledges all alerts, and a reading at each of ten events.
+    /// Inputs of a tick: a run, a command that acknowledges all alerts, and readings at ten events.
     struct Bench {
         list: AlertList,
         notes: Notes,
@@ -242,8 +243,8 @@ mod tests {
 
         /// Applies inputs up to the update before the event with this index, or the whole tick.
         ///
-        /// Returns the number of alerts raised, of those acknowledged, of commands without effect, and the
-        /// last reading heard.
+        /// Returns the number of alerts raised, the number of those acknowledged, the number of commands
+        /// without effect, and the last reading's time.
         fn until(&mut self, beat: Option<usize>) -> (u32, usize, u64, Option<u64>) {
             let mut alerting = Alerting {
                 list: &mut self.list,
@@ -275,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn update_includes_only_earlier_events() {
+    fn update_includes_only_earlier_inputs() {
         let at = |run: RunInput, command_before: usize, beat: usize| {
             Bench::new(run, command_before).until(Some(beat))
         };

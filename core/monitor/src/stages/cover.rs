@@ -1,6 +1,6 @@
 //! Converts georeferenced pings to samples, passes and sections, and judges sections.
 //!
-//! One pass over the pings does both, since earlier verdicts decide which sections are judged, and on which
+//! One loop over the pings does both, since earlier verdicts decide which sections are judged, and on which
 //! evidence.
 
 use bevy_ecs::prelude::{Res, ResMut, Single};
@@ -24,14 +24,14 @@ use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::passes::Situation;
 
-/// Interval between checks of the sections of a still zone.
+/// Interval between checks of the sections around a vehicle that stays in one place.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
-/// Time that a pilot needs to slow down before wall that hasn't passed, seconds.
+/// Time that a pilot needs to slow down before the vehicle reaches wall that hasn't passed, seconds.
 const SOON_S: f64 = 5.0;
 /// Speed at or below which the vehicle counts as going back, m/s.
 const ASTERN_MPS: f64 = -0.02;
-/// Confidence at which the error against the previous pass must reach the target for a speed to be no
-/// evidence.
+/// Number of standard deviations of the error against the previous pass. If they reach the target, a ping is
+/// no evidence of the speed.
 const ADRIFT_SD: f64 = 2.0;
 
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are its inputs and outputs")]
@@ -146,7 +146,7 @@ pub(super) fn cover(
     }
 }
 
-/// Whether all wall that heads see here, and in the next seconds, has passed, so that any speed is fine.
+/// Whether all wall that the heads see now and in the next seconds has passed, so that any speed is fine.
 fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) -> bool {
     let Coverage { sections, .. } = coverage;
     let reaches = heads.iter().map(|(.., frontier)| frontier.0.map(|reach| reach.latest()));
@@ -159,8 +159,9 @@ fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) 
     indices.all(|index| sections.get(index).is_some_and(|section| section.verdict == Verdict::Pass))
 }
 
-/// Place where a vehicle that goes back has to turn round for the nearest missed stretch that isn't ahead of
-/// it, m.
+/// Place where a vehicle that goes back must turn round for a missed stretch, m.
+///
+/// The stretch is the nearest one that isn't ahead of the vehicle.
 fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
     let x_m = situation.pose.filter(|_| situation.speed_mps < ASTERN_MPS)?.position.x();
     let missed = sections.runs().all().iter().filter(|run| run.is_open());
@@ -171,7 +172,7 @@ fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
 fn count(tally: &mut Tally, ping: &PlacedPing) {
     tally.without_fix += u64::from(ping.fix.is_none());
     match ping.outcome {
-        // Counted once the return is classified.
+        // Counted later, when the return is classified.
         Outcome::Sample { .. } => {}
         Outcome::Lost(Loss::Missing, _) => tally.missing += 1,
         Outcome::Lost(Loss::OutOfRange, _) => tally.out_of_range += 1,
@@ -185,14 +186,14 @@ fn count(tally: &mut Tally, ping: &PlacedPing) {
     }
 }
 
-/// Adds a ping to the passage of the section in which its head is.
+/// Adds a ping to the passage of the section that the ping's head is in.
 fn note_passage(
     coverage: &mut Coverage,
     frontier: &HeadFrontier,
     drive: &Drive,
     (ping, profile): (&PlacedPing, &Profile),
 ) {
-    // Without a fix, a ping counts at its head's last known place.
+    // A ping without a fix counts at its head's last known place.
     let Some(reach) = ping.reach.or_else(|| Some(frontier.0?.latest())) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
     let turns = coverage.frontier.turns();
@@ -218,7 +219,7 @@ fn note_passage(
     section.note_pass(&Visit::of(&fix, ping.valid_at, turns), profile);
 }
 
-/// Updates the head's reach.
+/// Updates the head's reach with a ping.
 fn note_reach(frontier: &mut HeadFrontier, ping: &PlacedPing) {
     match (ping.fix, ping.reach) {
         (Some(_), Some(reach)) => frontier.0 = Some(HeadReach::after(frontier.0, ping.received, reach)),
@@ -230,7 +231,7 @@ fn note_reach(frontier: &mut HeadFrontier, ping: &PlacedPing) {
     }
 }
 
-/// Updates the frontier, and requests judging of the sections now due.
+/// Updates the frontier, and requests judging of the sections that are due.
 fn note_frontier(
     coverage: &mut Coverage,
     heads: impl Iterator<Item = HeadReach> + Clone,
@@ -260,7 +261,7 @@ mod tests {
     use headrace_sensor::device::{SensorInfo, SensorKind};
     use headrace_sensor::reading::SourceId;
 
-    /// Sections of which the ones with these indices have failed.
+    /// Sections for a test. The ones with these indices have failed.
     fn missed(failed: &[i64]) -> Sections {
         let (Coverage { store, mut sections, .. }, profile) = (coverage(), pipe());
         let mut judging = Judging {
@@ -286,7 +287,8 @@ mod tests {
         sections
     }
 
-    /// The place is half a metre, the target, before the stretch from 5 m on, or that from 10 m on.
+    /// The place is half a metre before the missed stretch that begins at 5 m, or before the one at 10 m.
+    /// Half a metre is the target.
     #[test]
     fn vehicle_going_back_turns_before_the_nearest_missed_stretch() {
         let turns_m = |failed: &[i64], speed_mps: f64, x_m: Option<f64>| {
@@ -342,7 +344,7 @@ mod tests {
 
     /// A ping without a fix counts at its head's last known place.
     #[test]
-    fn passage_has_all_pings_and_the_worst_moment() {
+    fn passage_counts_all_pings_and_keeps_the_worst_driving_figures() {
         let (mut coverage, profile) = (coverage(), pipe());
         let here = Reach { from_m: 7.0, to_m: 7.2 };
         let frontier = HeadFrontier(Some(HeadReach::after(None, MonoNs(0), here)));
@@ -374,10 +376,10 @@ mod tests {
         assert_eq!(coverage.sections.get(28).unwrap().passage, elsewhere);
     }
 
-    /// If two standard deviations against the previous pass reach the target, the speed is no evidence. A
-    /// hole's error is 1.2 times a pass's.
+    /// A ping is no evidence of the speed if two standard deviations against the previous pass reach the
+    /// target. The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn ping_with_uncertain_place_is_no_evidence_of_speed() {
+    fn ping_with_an_uncertain_place_is_no_evidence_of_the_speed() {
         let profile = pipe();
         let noted = |sd_m: f64| {
             let mut coverage = coverage();
@@ -391,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn head_reach_stays_at_the_last_fix_while_heard() {
+    fn reach_of_a_pinging_head_stays_at_the_last_fix() {
         let at = |seconds: u64| MonoNs(seconds * 1_000_000_000);
         let ping = |seconds: u64, x_m: Option<f64>| PlacedPing {
             received: at(seconds),
@@ -410,10 +412,10 @@ mod tests {
         assert_eq!(frontier.0.map(|reach| reach.latest()), Some(Reach { from_m: 6.0, to_m: 6.0 }));
     }
 
-    /// At 0.4 m/s five seconds are 2 m. The checked wall extends from a quarter of a metre behind the rear
-    /// head to the same ahead of the front head's future place.
+    /// At 0.4 m/s, 2 m are covered in five seconds. The checked wall extends from a quarter of a metre behind
+    /// the rear head to a quarter of a metre ahead of the front head's future place.
     #[test]
-    fn all_has_passed_if_visible_and_upcoming_wall_has() {
+    fn all_has_passed_if_the_visible_and_the_upcoming_wall_have() {
         let passed = |between: core::ops::Range<i64>, speed_mps: f64, x_m: Option<f64>| {
             let mut coverage = coverage();
             for index in between {
@@ -437,8 +439,8 @@ mod tests {
             let heads = state.get_mut(&mut world).unwrap();
             is_passed(&coverage, &heads, &Situation { speed_mps, ..situation(x_m) })
         };
-        // From 4.75 m, section 19, to 8.25 m, section 33. Going back: from 2.75 m, section 11, to 6.25 m,
-        // section 25.
+        // Inwards: from 4.75 m, section 19, to 8.25 m, section 33. Going back: from 2.75 m, section 11, to
+        // 6.25 m, section 25.
         assert!(passed(19..34, 0.4, Some(5.5)) && passed(11..26, -0.4, Some(5.5)));
         assert!(passed(19..26, 0.0, Some(5.5)));
         for between in [20..34, 19..33, 19..26] {

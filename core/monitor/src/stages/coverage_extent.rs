@@ -1,5 +1,7 @@
-//! Coverage extent: where vehicle and heads have been, pinging or not, and sections left behind if no head
-//! pings.
+//! Coverage extent: the chainages at which the vehicle and its heads have been, whether the heads pinged or
+//! not.
+//!
+//! If no head pings, sections that the vehicle has left are judged here.
 
 use bevy_ecs::prelude::Query;
 
@@ -21,8 +23,9 @@ type HeadParts = (
     &'static mut HeadFrontier,
 );
 
-/// Extends the coverage extent at an update with a fix. If no head is alive, requests judging of the sections
-/// left behind.
+/// Extends the coverage extent at an update with a fix.
+///
+/// If no head works, requests judging of the sections that the vehicle has left.
 pub(super) fn note_beat(
     coverage: &mut Coverage,
     heads: &mut Heads<'_, '_>,
@@ -43,7 +46,7 @@ pub(super) fn note_beat(
         } else if situation.deaf.has(head.0) {
             note_silence(coverage, head.0, None, here);
         } else if frontier.0.is_none() {
-            // The head has not been heard yet, and may be about to ping.
+            // The head hasn't been heard yet. It may be about to ping.
             frontier.0 = Some(HeadReach::silent_at(None, here));
         }
     }
@@ -86,8 +89,8 @@ mod tests {
         MonoNs(seconds * 1_000_000_000)
     }
 
-    /// A vehicle with heads half a metre ahead and half a metre astern, last heard at these times, at 4.5 m
-    /// and 3.5 m.
+    /// A vehicle with heads half a metre ahead and half a metre astern, at 4.5 m and 3.5 m. `heard_s` has the
+    /// times of their last pings.
     struct Bench {
         world: World,
         coverage: Coverage,
@@ -125,7 +128,7 @@ mod tests {
             [places.next().flatten(), places.next().flatten()]
         }
 
-        /// Sections that a head has passed silently.
+        /// Sections that a head has passed without pinging.
         fn silent(&self, head: usize) -> Vec<i64> {
             let sections = 0..128;
             let passage = |index: &i64| self.coverage.sections.get(*index).unwrap().passage.silent.has(head);
@@ -135,7 +138,7 @@ mod tests {
 
     #[test]
     fn silent_head_moves_with_the_vehicle_and_marks_sections() {
-        // The second head is silent from 1 s on, the first one is heard.
+        // The second head is silent from 1 s on. The first one keeps pinging.
         let mut bench = Bench::new([Some(9), Some(1)]);
         assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first head is at its last ping");
         // From 3.5 m to 4.5 m.
@@ -144,7 +147,7 @@ mod tests {
         assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=20).collect()));
         let way = bench.coverage.frontier.way().unwrap();
         assert!((way.from_m - 4.5).abs() < 1e-9 && (way.to_m - 6.1).abs() < 1e-9, "{way:?}");
-        // The stretch passed by all heads spans from the front one's first place to the rear one's last.
+        // All heads have passed the stretch from the front head's first place to the rear head's last place.
         let through = bench.coverage.frontier.through();
         assert_eq!(through, None, "empty: 5.1 m isn't beyond 5.5 m");
         bench.beat(12, Some(7.0));
@@ -153,15 +156,15 @@ mod tests {
     }
 
     #[test]
-    fn sections_left_by_silent_heads_are_judged_at_the_update() {
+    fn sections_left_by_silent_heads_are_judged_at_the_next_update() {
         let mut bench = Bench::new([Some(1), Some(1)]);
         bench.beat(10, Some(5.0));
         bench.requests.0.clear();
         for seconds in 11..=20 {
             bench.beat(seconds, Some(5.0 + 0.3 * (seconds - 10) as f64));
         }
-        // From 4.5 m, where the extent begins with the rear head, to a quarter of a metre before its place at
-        // 7.5 m.
+        // The extent begins at 4.5 m, with the rear head. The sections end a quarter of a metre before the
+        // rear head's place at 7.5 m.
         let whole = bench.requests.0.iter().filter(|request| !request.only_fails);
         let mut left: Vec<i64> = whole.map(|request| request.section).collect();
         left.sort_unstable();
@@ -171,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn coverage_extent_is_unknown_without_a_fix() {
+    fn coverage_extent_is_unknown_until_there_is_a_fix() {
         let mut bench = Bench::new([Some(1), None]);
         assert_eq!(bench.beat(10, None), [Some(4.5), None]);
         assert!(bench.coverage.frontier.way().is_none() && bench.silent(0).is_empty());

@@ -23,7 +23,7 @@ pub(super) fn decode(
     events.0.clear();
     commands.0.clear();
     for (source, packet) in inbox.iter() {
-        // The console is no sensor: it doesn't contribute to the dive's times and counts.
+        // The console isn't a sensor, so it doesn't contribute to the dive's times and counts.
         if source == console.source {
             console.take(packet, events.0.len(), &mut commands);
             continue;

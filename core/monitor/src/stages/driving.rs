@@ -1,4 +1,5 @@
-//! Motion statistics of the vehicle and its heads at each update, stored with each section's passage.
+//! Driving figures of the vehicle and its heads at each update. They are stored with the passage of each
+//! section.
 
 use bevy_ecs::prelude::Component;
 
@@ -16,53 +17,56 @@ use headrace_sampling::margin::position_margin_m;
 use headrace_sampling::passes::{Passes, Phasing, Situation};
 use headrace_sampling::swing::Looks;
 
-/// Maximum look-back over the time between neighbouring passes, seconds.
+/// Longest time between neighbouring passes that the rotation of the vehicle is looked up for, seconds.
 const LONGEST_S: f64 = 50.0;
-/// Relative change of the passes above which the fitting speed is computed again.
+/// Relative change of the time between passes above which the fitting speed is computed again.
 const SAME_PASSES: f64 = 0.01;
-/// Search for the fitting speed: number of speeds tried, and ratio of each to the previous one.
+/// Search for the fitting speed: number of speeds tried, and ratio of each speed to the previous one.
 const SLOWER: u32 = 80;
 const SLOWER_BY: f64 = 0.97;
-/// Number of beams round a place for which steps along the wall are computed.
+/// Number of beams round a place for which the steps along the wall are computed.
 const RAYS: u32 = 72;
 /// Movement across the tunnel after which the steps along the wall are computed again, m.
 const MOVED_M: f64 = 0.05;
-/// Ratio of the time between passes to the scheduled one below which heads are in phase.
+/// Heads are in phase if the time between passes is at most this multiple of the scheduled time.
 const IN_STEP: f64 = 1.05;
-/// Classes of waiting time in a sector: from a whole sweep there and back at its ends to half of one in its
-/// middle.
+/// Number of classes of waiting time in a sector.
+///
+/// At an end of the sector, the wait for the next pass is a whole sweep there and back. In the middle it is
+/// half of that.
 const WAITS: usize = 4;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 
-/// Requirements of a dive.
+/// Requirements of a dive on the driving.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
     /// Speed for which the heads are set in phase, m/s; zero if none is planned.
     pub(super) planned_mps: f64,
     /// Target T, m.
     pub(super) target_m: f64,
-    /// Confidence: standard deviations of a hole by which a pass must clear the target.
+    /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
     pub(super) confidence_sd: f64,
-    /// Changes that other settings of the heads would bring.
+    /// Effect of other head settings.
     pub(super) other: OtherSettings,
 }
 
-/// Movement of vehicle and heads at the last update, and the earlier data that it needs.
+/// Driving figures at the last update, and the earlier data needed for them.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Driving {
     pub(super) now: Drive,
-    /// Step of the heads, radians, and the place for which steps along the wall were last computed, m.
+    /// Step of the heads, radians, and the place in the cross-section, m, for which the steps along the wall
+    /// were last computed.
     step_rad: f64,
     place_m: [f64; 2],
     /// Largest steps along the wall by class of waiting time, m.
     ///
-    /// Class n has waits of at most 1 - n / 8 of the longest. Heads that turn continuously wait equally
-    /// everywhere.
+    /// In class n the wait is at most 1 - n / 8 of the longest wait. With heads that turn continuously, all
+    /// waits are equal.
     steps_m: [f64; WAITS],
-    /// Inputs of the last computed fitting speed.
+    /// Inputs for which the fitting speed was last computed.
     ///
-    /// They are the time between passes, seconds, the steps along the wall, m, and the target less its
+    /// They are the time between passes, seconds, the steps along the wall, m, and the target minus its
     /// margin, m.
     fitted: [f64; 3],
     looks: Looks,
@@ -72,9 +76,9 @@ pub(crate) struct Driving {
 stateful!(Driving { state: now, step_rad, place_m, steps_m, fitted, looks, lacking; });
 
 impl Driving {
-    /// Updates the statistics, from the present situation and the one with no head silent or stalled.
+    /// Updates the figures from the present situation, and from the same situation with no head silent or
+    /// stalled.
     ///
-    /// Allocates: never.
     /// Allocates: never.
     pub(super) fn note(
         &mut self,
@@ -97,7 +101,7 @@ impl Driving {
         let place_m = [pose.position.y(), pose.position.z()];
         self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
-        // Neighbouring passes may belong to heads apart along the hull.
+        // Two neighbouring passes may belong to heads apart along the hull.
         let apart_s = apart_m(situation) / situation.speed_mps.abs().max(SLOW_MPS);
         let since = at - DurNs::from_secs_f64((self.now.healthy_gap_s + apart_s).min(LONGEST_S));
         let turned_rad = self.looks.turned_since(look, since);
@@ -184,7 +188,8 @@ impl Driving {
         let gap_at_plan_s = gap_s(&as_it_is.at(plan_mps));
         let healthy_at_plan_s = gap_s(&phasing.at(plan_mps));
         let all_turn = turning == situation.configured && self.lacking.all_turn(at);
-        // At other than the planned speed, heads in phase may pass unevenly, and others evenly.
+        // At a speed other than the planned one, heads in phase may pass unevenly, and heads out of phase
+        // evenly.
         if all_turn && gap_at_plan_s <= IN_STEP * gap_s(&scheduled_at_plan).min(healthy_at_plan_s) {
             self.lacking.stalled = HeadSet::default();
         }
@@ -208,10 +213,10 @@ impl Driving {
     }
 }
 
-/// Largest distances along the perimeter between the wall points of two beams a step apart, seen from a
-/// place, m.
+/// Largest steps along the wall between two neighbouring beams, m, by class of waiting time.
 ///
-/// They are by class of waiting time in one of `sectors` sectors. Without sectors all are equal to the first.
+/// The beams come from `place_m` and are `step_rad` apart. The head sweeps `sectors` sectors. Without sectors
+/// all classes equal the first.
 fn steps_by_wait_m(profile: &Profile, place_m: Yz, step_rad: f64, sectors: usize) -> [f64; WAITS] {
     let arc_m = |angle_rad: f64| {
         let wall = profile.cast(place_m, [math::sin(angle_rad), -math::cos(angle_rad)]);
@@ -284,14 +289,15 @@ mod tests {
         driving.now
     }
 
-    /// If one of four heads a quarter of a turn apart is missing, at 8 s a turn, the gap is half a turn.
+    /// Four heads are a quarter of a turn apart and turn in 8 s. Without one of them, the longest gap is half
+    /// a turn.
     #[test]
     fn stalled_head_counts_again_only_once_in_phase() {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
         driving.lacking.stalled = HeadSet::default().with(1);
-        // A sixteenth of a turn late.
+        // The head is a sixteenth of a turn late.
         let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
         assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
         assert!(near(late.even_gap_s, 2.0), "if they were evenly spread");
@@ -303,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn pass_gaps_are_kept_while_all_heads_stand_still() {
+    fn time_between_passes_is_kept_while_all_heads_are_stalled() {
         let profile = shapes::circle(3.0).unwrap();
         let plan =
             Plan { planned_mps: 0.2, target_m: 0.5, confidence_sd: 2.0, other: OtherSettings::default() };
@@ -316,15 +322,15 @@ mod tests {
         assert_eq!(times(&driving.now), times(&before), "{:?}", driving.now);
     }
 
-    /// From the centre of a pipe of 3 m radius a step measures 0.0471 m along the wall. That leaves 0.4978 m
-    /// of the target along the tunnel, for 2 s and a ping.
+    /// From the centre of a pipe of 3 m radius a step measures 0.0471 m along the wall. This leaves 0.4978 m
+    /// of the target along the tunnel, to be driven in 2 s plus one ping period.
     #[test]
-    fn fitting_speed_leaves_room_for_the_steps() {
+    fn fitting_speed_allows_for_the_steps_along_the_wall() {
         let along_m = math::sqrt(0.25 - 9.0 * STEP_RAD * STEP_RAD);
         let most_mps = along_m / 2.02;
         let fits_mps = |planned_mps: f64| {
             let mut driving = Driving::default();
-            // Steps are known from the first update on.
+            // The steps are known only after the first update.
             noted(&mut driving, EVEN, -0.1, planned_mps);
             let now = noted(&mut driving, EVEN, -0.1, planned_mps);
             assert!((now.fits_along_m - along_m).abs() < 1e-6 && (now.speed_mps - 0.1).abs() < 1e-12);
@@ -332,17 +338,17 @@ mod tests {
             now.fits_mps
         };
         assert!((fits_mps(0.2) - 0.2).abs() < 1e-12, "as planned");
-        // The fastest of the speeds tried, which are three hundredths apart.
+        // Neighbouring speeds of the search differ by 3 %. The fastest suitable one is found.
         for planned_mps in [0.0, 1.02 * most_mps] {
             let found = fits_mps(planned_mps);
             assert!(found <= most_mps && found > 0.96 * most_mps, "{planned_mps}: {found} of {most_mps}");
         }
     }
 
-    /// In a pipe of 3 m radius, seen from 1 m below its centre. Relative to a distance of one metre, a step
-    /// is twice as long along the floor, four times along the ceiling, and three times at the sides.
+    /// The place is 1 m below the centre of a pipe of 3 m radius. Per radian, a step measures 2 m along the
+    /// floor, 4 m along the ceiling and 3 m at the sides.
     #[test]
-    fn steps_are_the_largest_in_their_waiting_class() {
+    fn steps_are_the_largest_of_their_waiting_class() {
         const SMALL_RAD: f64 = 1e-4;
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -356,7 +362,7 @@ mod tests {
             near(all[0], 4.0) && all[1..].iter().all(|step| step.abs() <= 0.0),
             "all waits must be equal: {all:?}"
         );
-        // Two sectors end below and above. The middle quarter of each is at a side.
+        // Two sectors end at the floor and at the ceiling. The middle quarter of each is at a side.
         let below = of([0.0, -1.0], 2);
         assert!(near(below[0], 4.0) && (3.0..3.5).contains(&below[3]), "{below:?}");
         assert!(below.windows(2).all(|pair| pair[0] > pair[1]), "decreasing from the ceiling on: {below:?}");
@@ -364,17 +370,17 @@ mod tests {
             let beside = of([aside_m, 0.0], 2);
             assert!(near(beside[3], 4.0) && (3.0..3.7).contains(&beside[0]), "{beside:?}");
         }
-        // Four sectors end at the sides, too. The middle quarter of the upper ones begins at 34 degrees, with
-        // a step 3.83 times as long.
+        // Four sectors also end at the sides. The middle quarter of each upper sector begins at 34 degrees,
+        // where a step measures 3.83 m per radian.
         let four = of([0.0, -1.0], 4);
         assert!(near(four[0], 4.0) && near(four[3], 3.83), "{four:?}");
-        // From the centre a step has the same length everywhere.
+        // From the centre a step measures the same everywhere.
         assert!(of([0.0, 0.0], 3).iter().all(|step| near(*step, 3.0)));
     }
 
-    /// With the vehicle this far beside the centre, a step on the opposite wall gets longer.
+    /// The farther the vehicle is from the centre, the longer is a step on the opposite wall.
     #[test]
-    fn steps_are_recomputed_after_5_cm_or_a_new_step() {
+    fn steps_are_recomputed_after_5_cm_across_or_a_changed_head_step() {
         let profile = shapes::circle(3.0).unwrap();
         let mut driving = Driving::default();
         let mut t_y_m = |aside_m: f64, finer: f64| {

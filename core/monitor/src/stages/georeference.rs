@@ -90,7 +90,7 @@ pub(super) fn georeference(
     }
 }
 
-/// Counts a ping at wall that the head could detect.
+/// Counts a ping that was aimed at wall within range.
 fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel: &TunnelDesign) {
     match ping.outcome {
         Outcome::Sample { point, arc_m } => {
@@ -107,9 +107,9 @@ fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel
     }
 }
 
-/// Angle next to occluded ones at which the vehicle may also return echoes, radians.
+/// Angle beside the occluded angles at which the vehicle may also return echoes, radians.
 const BESIDE_RAD: f64 = 0.09;
-/// Share of the range to the wall below which a return at an occluded angle is from the vehicle.
+/// Share of the range to the wall. A return from a shorter range at an occluded angle is from the vehicle.
 const VEHICLE_SHARE: f64 = 0.5;
 
 fn outcome(
@@ -142,7 +142,7 @@ fn outcome(
         return sample(range_m);
     }
     let loss = match wall_m {
-        // Occlusion is undetectable for wall out of range.
+        // Wall beyond the longest range counts as out of range, even if the vehicle occludes it.
         Some(wall_m) if wall_m > longest_m(sonar, tunnel) => Loss::OutOfRange,
         _ if hidden => Loss::Occluded,
         Some(_) => Loss::Missing,
@@ -151,12 +151,15 @@ fn outcome(
     Outcome::Lost(loss, aim)
 }
 
-/// Longest range at the head's setting in this water, m.
+/// Longest range at the head's range setting in this water, m.
 fn longest_m(sonar: &SonarReturn, tunnel: &TunnelDesign) -> f64 {
     tunnel.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps)
 }
 
-/// Reach of a head. Its samples lie in the plane across its axis. If tilted, that plane spans some chainage.
+/// Chainages that a head reaches.
+///
+/// The samples lie in the plane across the head's axis. If the head is tilted, this plane extends over some
+/// chainage.
 pub(super) fn reach(pose: &Pose, mount: &Mount, tunnel: &TunnelDesign) -> Reach {
     let origin = pose.place(mount.position);
     let axis = pose.attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
@@ -193,7 +196,7 @@ fn situation(
             continue;
         };
         if at.since(last).0.abs() <= SILENT_AFTER.0 {
-            // Heads ping at different times. Their angles are extrapolated to a common epoch.
+            // Heads ping at different times, so their angles are extrapolated to the same time.
             let angle_rad = angle_rad + rate_radps * at.since(last).as_secs_f64();
             let (mount, sector_rad) = (mounted.info.mount, track.sector_rad());
             let others = heads.iter().filter(|(other, ..)| other.0 != head.0);
@@ -241,8 +244,8 @@ mod tests {
         TunnelDesign { profile, site, length_m, contradiction_m: 1.0, limits }
     }
 
-    /// Outcome of a ping at 90 degrees, to the left, in the centre of a pipe of 3 m radius. The head's speed
-    /// of sound is that of the water.
+    /// Outcome of a ping at 90 degrees, to the left, from the centre of a pipe of 3 m radius. The head
+    /// assumes the speed of sound of the water.
     fn heard(range_m: Option<f64>, hidden: bool) -> Outcome {
         let tunnel = tunnel();
         let [y_m, z_m] = tunnel.profile.reference();
@@ -257,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn echo_off_the_vehicle_is_no_wall() {
+    fn echo_from_the_vehicle_is_not_wall() {
         for range_m in [0.1, 0.75, 1.4] {
             assert!(
                 matches!(heard(Some(range_m), true), Outcome::Lost(Loss::Occluded, Some(_))),
@@ -265,19 +268,20 @@ mod tests {
             );
             assert!(matches!(heard(Some(range_m), false), Outcome::Sample { .. }), "{range_m}");
         }
-        // A return from beyond half the range isn't from the vehicle.
+        // A return from more than half the distance of the wall is not from the vehicle.
         assert!(matches!(heard(Some(1.6), true), Outcome::Sample { .. }));
         assert!(matches!(heard(None, true), Outcome::Lost(Loss::Occluded, Some(_))));
         assert!(matches!(heard(None, false), Outcome::Lost(Loss::Missing, Some(_))));
     }
 
-    /// Heads are extrapolated to an update whether or not they have pinged at it. A head silent for over two
-    /// seconds is left out.
+    /// Angles are extrapolated to the update, even if the head hasn't pinged at that time. A head silent for
+    /// over two seconds is left out.
     #[test]
     fn head_angles_are_extrapolated_to_the_update() {
         const RATE_RADPS: f64 = 0.785;
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
-        // 400 pings in 8 s, from these times on, at these rates.
+        // Each head makes 400 pings in 8 s. The first number is its first ping's time, the second its turn
+        // rate.
         let heads = [(1.0, RATE_RADPS), (3.0, -RATE_RADPS), (0.5, RATE_RADPS)];
         let mut world = World::new();
         for (number, (from_s, rate_radps)) in heads.into_iter().enumerate() {

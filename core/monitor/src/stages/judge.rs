@@ -11,14 +11,15 @@ use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::reading::SourceId;
 
-/// Search state and outputs of judging, apart from the sections.
+/// Working memory and outputs of judging, without the sections.
 pub(crate) struct Results<'a> {
     pub(crate) finder: &'a mut Finder,
     pub(crate) notices: &'a mut Notices,
     pub(crate) digests: &'a mut Digests,
     pub(crate) alerts: &'a mut Alerts,
     pub(crate) runs: &'a mut RunInputs,
-    /// Index of the event of the judgement, and whether it is at an update before that event.
+    /// Index of the event at which the section is judged. The flag says whether it is judged at an update
+    /// before this event.
     pub(crate) place: (usize, bool),
 }
 
@@ -81,9 +82,9 @@ pub(crate) fn judge_one(
     }
 }
 
-/// Keeps changed runs for the list of alerts.
+/// Records changed runs for the list of alerts.
 ///
-/// Cleared runs come last, since their remains belong to the same alert.
+/// Cleared runs come last, so that the list already knows the runs that remain of them: these keep the alert.
 fn note_runs(notices: &[Notice], place: (usize, bool), sections: &Sections, runs: &mut RunInputs) {
     for cleared in [false, true] {
         for notice in notices {
@@ -95,7 +96,7 @@ fn note_runs(notices: &[Notice], place: (usize, bool), sections: &Sections, runs
     }
 }
 
-/// Adds an alert to the digest, with its chainage, deviation, m, and head if it names one.
+/// Adds an alert to the digest: its chainage, its deviation, m, and its source if it names one.
 pub(crate) fn digest_alert(
     digests: &mut Digests,
     kind: AlertKind,
@@ -118,8 +119,9 @@ mod tests {
 
     const AT: MonoNs = MonoNs(7_000_000_000);
 
-    /// Judges a section without a sample, 20 m before where samples may still land. Some heads haven't passed
-    /// a chainage, m.
+    /// Judges a section without samples, at 20 m of distance from places where samples may still land.
+    ///
+    /// Some heads haven't passed `not_passed_m`, m.
     fn judged(coverage: &mut Coverage, section: i64, not_passed_m: f64) -> (Vec<Notice>, Vec<RunInput>) {
         let request = Request {
             section,
@@ -153,7 +155,8 @@ mod tests {
         assert_eq!((notices, coverage.unsure), (vec![run, section], None));
         let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_beat, run.at));
         assert_eq!(found.collect::<Vec<_>>(), [(RunId(0), RunChange::Raised, 3, true, AT)]);
-        // If not all heads have passed, there is no verdict: one stretch of neighbours, and a distant one.
+        // If not all heads have passed, there is no verdict. Neighbouring sections form one stretch, and a
+        // distant section another.
         for (section, from, to, sections) in [(20, 20, 21, 1), (21, 20, 22, 2), (60, 60, 61, 1)] {
             let (notices, runs) = judged(&mut coverage, section, 20.0);
             assert_eq!((notices.len(), runs.len()), (1, 0));
@@ -163,9 +166,9 @@ mod tests {
         }
     }
 
-    /// Alerts of cleared runs pass to the remaining runs, which must be known by then.
+    /// The alert of a cleared run passes to the runs that remain of it, so the list must know these first.
     #[test]
-    fn cleared_runs_come_last_while_there_is_room() {
+    fn cleared_runs_come_last_and_runs_without_room_are_dropped() {
         let mut coverage = coverage();
         for section in [20, 40, 60] {
             judged(&mut coverage, section, -20.0);

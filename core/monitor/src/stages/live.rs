@@ -22,9 +22,9 @@ use headrace_sampling::head::HeadSet;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Maximum share of the target that the advice reserves for position errors.
+/// Maximum share of the target for position errors for which the advice allows.
 const SPREAD_SHARE: f64 = 0.2;
-/// Time for which an alert of single occurrences holds.
+/// Time for which an alert about single occurrences stays active.
 const HOLDS: DurNs = DurNs(10_000_000_000);
 
 /// Judged metres and active alerts at an update.
@@ -220,7 +220,7 @@ mod tests {
 
     const AT: MonoNs = MonoNs(9_000_000_000);
 
-    /// Live state after an update with this error between passes.
+    /// Live state after an update with this position error between passes.
     ///
     /// The target is half a metre, with two standard deviations.
     fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {
@@ -267,7 +267,7 @@ mod tests {
         *world.resource::<LiveState>()
     }
 
-    /// Two standard deviations may take a fifth of the target.
+    /// Two standard deviations may be at most a fifth of the target.
     #[test]
     fn position_is_doubtful_if_passes_are_uncertain_or_the_cable_is_distrusted() {
         let spread = PositionState::Doubtful(PositionDoubt::Spread);
@@ -292,9 +292,9 @@ mod tests {
         }
     }
 
-    /// A distrusted head has its own alert, and no other.
+    /// A distrusted head has an alert for its own reason only.
     #[test]
-    fn each_distrusted_head_has_its_reason() {
+    fn distrusted_head_has_only_the_alert_for_its_reason() {
         let kinds = [AlertKind::HeadScattered, AlertKind::HeadConstant, AlertKind::HeadOutvoted];
         for (added, kind) in [(0, kinds[0]), (5, kinds[1]), (63, kinds[2])] {
             let mut bits = HeadBits::default();

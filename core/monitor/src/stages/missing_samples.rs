@@ -1,9 +1,9 @@
 //! Finds missing samples: lost pings, pings that silent and stalled heads would have made, and pings without
 //! a fix.
 //!
-//! A silent or stalled head is assumed to turn on at its last rate. Each update records where its pings would
-//! have met the design. Pings without a fix are recorded once there is a fix again, along the straight line
-//! between the two fixes.
+//! A silent or stalled head is assumed to turn on at its last rate. At each update, the points are recorded
+//! at which its pings would have met the design. Pings without a fix are recorded as soon as there is a fix
+//! again. They are placed along the straight line between the two fixes.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,25 +22,26 @@ use headrace_sampling::passes::Situation;
 
 /// Time without a ping at a new angle after which a head's samples count as missing.
 const LACKING_AFTER: DurNs = DurNs(400_000_000);
-/// Number of pings at hidden angles needed to decide on occlusion, and share of losses that confirms it.
+/// Number of latest pings at hidden angles that decide on occlusion, and the share of lost pings that
+/// confirms it.
 const HIDDEN_PINGS: u16 = 600;
 const HIDDEN_SHARE: f64 = 0.7;
-/// Capacity for pings without a fix: four heads for over two minutes.
+/// Capacity for pings without a fix. It suffices for over two minutes of four heads.
 const ROOM: usize = 1 << 15;
 
 /// A head as last seen turning.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Turning {
-    /// Angle, radians, rate, rad/s, and step, radians, at an update.
+    /// Time of an update, and the head's angle, radians, rate, rad/s, and step, radians, at that time.
     seen: Option<(MonoNs, f64, f64, f64)>,
-    /// Times of its last ping, and of its last ping at a new angle.
+    /// Time of the last ping, and of the last ping at a new angle.
     pinged: Option<MonoNs>,
     moved: Option<MonoNs>,
-    /// Time up to which its missing samples have been recorded.
+    /// Time up to which the head's missing samples have been recorded.
     noted: Option<MonoNs>,
-    /// Longest range at its setting, m.
+    /// Longest range at the head's range setting, m.
     longest_m: f64,
-    /// Latest pings at angles that the vehicle hides: number without a return, and total.
+    /// Latest pings at angles that the vehicle is assumed to hide: number without a return, and total.
     hidden: [u16; 2],
     /// Whether the last simulated ping was lost.
     would_lose: bool,
@@ -57,10 +58,13 @@ impl Turning {
         }
     }
 
-    /// Whether a simulated ping is lost: drawn from the head's loss rate, with its time as the random number.
+    /// Decides at random whether a simulated ping is lost, at the head's loss rate.
+    ///
+    /// The time of the ping gives the random number.
     fn would_lose(&mut self, when: MonoNs, rate: LossRate) -> bool {
         let LossRate { share, after_lost } = rate;
-        // For a head that lost everything, or whose losses never end, the rate after a return is unknown.
+        // The rate after a return is unknown if all pings were lost, or if a loss was always followed by
+        // another.
         let is_known = share < 1.0 && after_lost < 1.0;
         let after_heard = if is_known { share * (1.0 - after_lost) / (1.0 - share) } else { share };
         let chance = if self.would_lose { after_lost } else { after_heard };
@@ -68,20 +72,21 @@ impl Turning {
         self.would_lose
     }
 
-    /// Whether the vehicle really hides the angles assumed to be hidden.
+    /// Whether the vehicle hides the angles that are assumed to be hidden.
     fn is_hidden(&self) -> bool {
         let [lost, all] = self.hidden;
         HIDDEN_SHARE * f64::from(all) <= f64::from(lost)
     }
 }
 
-/// A ping without a fix, made or simulated.
+/// A ping without a fix, either real or simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Away {
     at: MonoNs,
     head: u8,
     angle_rad: f64,
-    /// Causes other than the position. A ping without a return is judged by its aim.
+    /// Causes other than the missing position. For a ping without a return, the aim decides on further
+    /// causes.
     why: Causes,
     is_lost: bool,
 }
@@ -93,18 +98,18 @@ pub(crate) struct MissingSampleFinder {
     /// Last update with a fix.
     pose: Option<(MonoNs, Pose)>,
     away: Vec<Away>,
-    /// Some pings were dropped for lack of room.
+    /// Whether pings were dropped for lack of room.
     forgot: bool,
-    /// Heads that have stalled and have been out of phase since.
+    /// Heads that have stalled and have not been in phase since.
     pub(super) stalled: HeadSet,
-    /// Heads that detected no wall at the last update.
+    /// Deaf heads, as of the last update.
     deaf: HeadSet,
 }
 
 stateful!(MissingSampleFinder { state: heads, pose, forgot, stalled, deaf; lists: away; });
 
 impl Default for MissingSampleFinder {
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory of the finder.
     fn default() -> Self {
         Self {
             heads: [Turning::default(); MAX_HEADS],
@@ -124,7 +129,7 @@ impl MissingSampleFinder {
         self.heads.iter().filter_map(|head| head.moved).all(turns)
     }
 
-    /// The situation with no head silent or stalled: such heads turn on as they last did.
+    /// The situation as if no head were silent or stalled. Such heads turn on at their last rate.
     pub(super) fn healthy(&mut self, at: MonoNs, situation: &Situation, heads: &Heads<'_, '_>) -> Situation {
         let stalled = self.stalled;
         let mut healthy = *situation;
@@ -149,7 +154,7 @@ impl MissingSampleFinder {
     }
 }
 
-/// Records a ping, as a missing sample if it was aimed at the wall without a return.
+/// Records a ping. If it was aimed at the wall and gave no return, it is a missing sample.
 pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, lacks: &mut MissingSamples) {
     if ping.standing {
         lacking.stalled = lacking.stalled.with(ping.head);
@@ -166,14 +171,14 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
         Outcome::Sample { .. } => head.note_hidden(ping.hidden == Hidden::Yes, false),
         Outcome::Lost(loss, Some(Aim { x_m, arc_m })) => {
             head.note_hidden(loss == Loss::Occluded, true);
-            // If the wall is detected at such angles after all, lost pings there are missing returns.
+            // If such angles do return the wall, a lost ping there is a missing return.
             let heard = loss == Loss::Occluded && !head.is_hidden();
             let cause = match loss {
                 Loss::Missing if deaf.has(ping.head) => Cause::HeadSilent,
                 Loss::Occluded if heard => Cause::MissingReturns,
                 loss => Cause::of_loss(loss),
             };
-            // With a longer range the vehicle would still occlude it.
+            // Even with a longer range setting the vehicle would occlude this wall.
             let stays = loss == Loss::OutOfRange && ping.hidden == Hidden::Yes && head.is_hidden();
             let why = if stays { Causes::of(cause).with(Cause::Occluded) } else { Causes::of(cause) };
             lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why });
@@ -189,12 +194,12 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
     }
 }
 
-/// A head's number as stored.
+/// The form in which a head's number is stored.
 pub(super) fn number_of(head: usize) -> u8 {
     u8::try_from(head).unwrap_or(u8::MAX)
 }
 
-/// Records the heads that detect no wall. Their losses in the last turn are not random.
+/// Records the deaf heads. Their losses in the last turn are not random.
 fn note_deaf(lacking: &mut MissingSampleFinder, deaf: HeadSet, coverage: &mut Coverage) {
     let before = core::mem::replace(&mut lacking.deaf, deaf);
     for head in deaf.iter().filter(|head| !before.has(*head)) {
@@ -211,7 +216,8 @@ fn note_deaf(lacking: &mut MissingSampleFinder, deaf: HeadSet, coverage: &mut Co
     }
 }
 
-/// Records at an update simulated pings of silent and stalled heads, and places of pings without a fix.
+/// Records missing samples at an update: simulated pings of silent and stalled heads, and pings without a
+/// fix.
 ///
 /// Allocates: never.
 pub(super) fn note_beat(
@@ -231,7 +237,7 @@ pub(super) fn note_beat(
     let speed_mps = situation.speed_mps;
     for (number, mounted, hidden, ..) in heads {
         let Some(head) = turning.get_mut(number.0) else { continue };
-        // A stalled head's samples are missing at its expected place until it is in phase again.
+        // Until a stalled head is in phase again, its samples are missing at the place that it should have.
         let out_of_step = stalled.has(number.0);
         let late = |moved: &MonoNs| out_of_step || at.since(*moved).0 > LACKING_AFTER.0;
         let Some(moved) = head.moved.filter(late) else { continue };
@@ -267,7 +273,7 @@ pub(super) fn note_beat(
                 let placing = Placing { mount: &mounted.info.mount, turning: head, profile, hidden: &hides };
                 placing.lack(&pose, &ping, now, coverage);
             } else if !keep(away, Away { why: ping.why.with(Cause::PositionLost), ..ping }) {
-                // There is no room for the following ones either.
+                // There is no room for the remaining pings of this head either, so they are skipped.
                 *forgot = true;
                 when = when + DurNs((self::owed(when, at, period) - 1).saturating_mul(period.0));
             }
@@ -280,7 +286,7 @@ pub(super) fn note_beat(
     }
 }
 
-/// Records pings without a fix once there is a fix again.
+/// Records pings without a fix as soon as there is a fix again.
 ///
 /// Allocates: never.
 pub(super) fn note_away(
@@ -317,21 +323,21 @@ pub(super) fn note_away(
 
 /// Number of pings due from `first` to `at`.
 ///
-/// It takes constant time, since a log may put years between two updates.
+/// The computation takes constant time, since two updates in a log may be years apart.
 fn owed(first: MonoNs, at: MonoNs, period: DurNs) -> i64 {
     let since = at.since(first).0;
     if since < 0 { 0 } else { since.checked_div(period.0).map_or(0, |periods| periods.saturating_add(1)) }
 }
 
-/// Pseudo-random number from 0 to 1, evenly spread over different inputs. Source: Steele et al. 2014,
-/// finalizer of splitmix64.
+/// Pseudo-random number from 0 to 1, evenly distributed over different inputs. Source: Steele et al. 2014,
+/// finaliser of splitmix64.
 fn unit_of(number: u64) -> f64 {
     let mixed = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Keeps a ping without a fix. False if there is no room.
+/// Keeps a ping without a fix. Returns false if there is no room.
 fn keep(away: &mut Vec<Away>, ping: Away) -> bool {
     let has_room = away.len() < away.capacity();
     if has_room {
@@ -356,7 +362,7 @@ impl Way {
         (self.to.1.position.x() - self.from.1.position.x()).abs() / seconds
     }
 
-    /// Pose at a time between the fixes. The attitude is that of the nearer fix.
+    /// Pose at a time between the two fixes. The attitude is that of the nearer fix.
     fn at(&self, at: MonoNs) -> Pose {
         let whole_s = self.to.0.since(self.from.0).as_secs_f64().max(1e-3);
         let share = (at.since(self.from.0).as_secs_f64() / whole_s).clamp(0.0, 1.0);
@@ -375,7 +381,8 @@ struct Placing<'a> {
 }
 
 impl Placing<'_> {
-    /// Records a missing sample at the aim of a ping, made or simulated, and the driving figures there.
+    /// Records a missing sample at the aim of a real or simulated ping, and the driving figures at this
+    /// place.
     fn lack(&self, pose: &Pose, ping: &Away, drive: Drive, coverage: &mut Coverage) {
         let origin = pose.place(self.mount.position);
         let beam = pose.attitude * (self.mount.rotation * head_direction(ping.angle_rad));
@@ -387,10 +394,11 @@ impl Placing<'_> {
             section.passage.drive = section.passage.drive.or_worse(drive);
         }
         let mut why = ping.why;
-        // A ping made without a return was lost for another reason, too. So would a simulated one have been.
+        // A real ping without a return also gets a further cause here. A simulated one already has its
+        // causes.
         let made = why == Causes::of(Cause::PositionLost);
         if ping.is_lost {
-            // Wall that the head would not have detected anyway is not lost by chance.
+            // A ping that the head would not have detected anyway is not lost by chance.
             let elsewhere = |why: Causes| why.without(Cause::MissingReturns);
             let is_far = wall.range_m > self.turning.longest_m;
             let is_hidden = self.turning.is_hidden() && (self.hidden)(ping.angle_rad);

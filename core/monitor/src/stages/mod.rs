@@ -38,7 +38,7 @@ pub(super) fn add(schedule: &mut Schedule) {
     ));
 }
 
-/// Adds the systems that place pings.
+/// Adds the core's systems up to georeferencing.
 pub(super) fn add_placing(schedule: &mut Schedule) {
     schedule.add_systems((
         decode::decode.in_set(Stage::Decode),

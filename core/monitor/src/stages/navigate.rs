@@ -23,7 +23,8 @@ pub(super) fn navigate(
     let (mut navigator, mut state) = vehicle.into_inner();
     let navigator = &mut *navigator;
     for (index, event) in events.0.iter().enumerate() {
-        // Time may stall or go back. Each update is emitted once. After a gap only the last one is.
+        // Time may stall or go back. Each update is emitted once. After a gap, only the last update is
+        // emitted.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
@@ -49,7 +50,8 @@ pub(super) fn navigate(
 }
 
 impl Navigator {
-    /// Whether the inertial unit or velocity log of an event is stuck: its repeated readings are ignored.
+    /// Whether the source of an event is a stuck inertial unit or velocity log. Repeated readings are
+    /// ignored.
     fn hangs(&mut self, event: &Event) -> bool {
         let source = event.source.index();
         let bit = 1_u64 << (source % 64);
@@ -63,7 +65,7 @@ impl Navigator {
     }
 }
 
-/// Time of the last update at or before `now`, unless it was already emitted.
+/// Time of the last update at or before `now`; `None` if this update was already emitted.
 fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
     let period = ADVICE_PERIOD.0.unsigned_abs();
     let last = MonoNs(now.0 - now.0 % period);
@@ -106,7 +108,7 @@ mod tests {
 
     /// Updates come five times a second, from the first packet on.
     #[test]
-    fn each_update_comes_once_and_only_the_last_after_a_gap() {
+    fn each_update_comes_once_and_a_gap_gives_only_the_last() {
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
         let mut next = None;
         for (now_s, beat_s) in [
@@ -114,11 +116,11 @@ mod tests {
             (1.199, None),
             (1.2, Some(1.2)),
             (1.21, None),
-            // Time goes back, and catches up.
+            // Time goes back, then catches up.
             (0.3, None),
             (1.39, None),
             (1.43, Some(1.4)),
-            // After a gap.
+            // After a gap in the data.
             (5.07, Some(5.0)),
             (5.19, None),
             (5.2, Some(5.2)),

@@ -1,4 +1,4 @@
-//! Raises alerts for the doubts of navigation.
+//! Raises alerts for the doubts that navigation reports.
 
 use super::judge::digest_alert;
 use crate::alerts::{AlertKind, Alerts};
@@ -9,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Records the doubts of an update.
+/// Records the doubts reported at an update.
 pub(super) fn note(
     at: MonoNs,
     situation: &Situation,

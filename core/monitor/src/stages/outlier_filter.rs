@@ -19,10 +19,10 @@ use headrace_coverage::{
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
 
-/// Distance beyond either end of the tunnel at which samples raise an alert, m.
+/// Distance beyond either end of the tunnel from which samples raise an alert, m.
 const WELL_BEYOND_M: f64 = 1.0;
 
-/// Inputs and outputs of the filter, apart from the head.
+/// Inputs and outputs of the filter, without the head.
 pub(super) struct FilterContext<'a> {
     pub(super) coverage: &'a mut Coverage,
     pub(super) tunnel: &'a TunnelDesign,
@@ -32,9 +32,10 @@ pub(super) struct FilterContext<'a> {
     pub(super) alerts: &'a mut Alerts,
 }
 
-/// Filters a ping's return, and those that waited for it. A ping without a return breaks the sweep.
+/// Filters a ping's return, and the returns that waited for this ping. A ping without a return breaks the
+/// sweep.
 ///
-/// Returns the chainages of the samples of a head that has just become distrusted, m.
+/// If the head has just become distrusted, returns the chainages of its samples, m.
 pub(super) fn note_ping(
     sorting: &mut FilterContext<'_>,
     sweep: &mut HeadSweep,
@@ -97,8 +98,8 @@ type End<'w, 's> = (
     ResMut<'w, Alerts>,
 );
 
-/// Classifies the waiting returns at the end of a dive, when no more returns will come. Allocates: not within
-/// a tick.
+/// Classifies the returns that still wait at the end of a dive, when no more returns will come. Allocates:
+/// outside a tick only.
 pub(crate) fn end_returns(world: &mut World) {
     let heads = world.resource::<VehicleEntities>().heads.clone();
     let mut state = SystemState::<End<'_, '_>>::new(world);
@@ -123,7 +124,7 @@ pub(crate) fn end_returns(world: &mut World) {
     }
 }
 
-/// Marks the sections that hold samples of a distrusted head, and requests judging of those that have passed.
+/// Marks the sections that have samples of a distrusted head. Requests judging of those that have passed.
 pub(super) fn suspect(
     coverage: &mut Coverage,
     [from_m, to_m]: [f64; 2],
@@ -140,7 +141,7 @@ pub(super) fn suspect(
     }
 }
 
-/// Applies a waiting return, and the pings since.
+/// Applies a waiting return that has been classified, and then the pings since.
 fn settle(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, waiting: &Waiting, is_wall: bool) {
     if is_wall {
         wall(sorting, sweep, &waiting.ping);
@@ -167,7 +168,7 @@ fn wall(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPin
     store(sorting, sweep, ping);
 }
 
-/// Stores a sample, or breaks the sweep if there is none.
+/// Stores a ping's sample. Without a sample the sweep is broken.
 fn store(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
     match note_sample(sorting.coverage, sweep, sorting.tunnel, ping) {
         Ok(()) => {}
@@ -176,7 +177,8 @@ fn store(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPi
     }
 }
 
-/// Counts a doubtful return. For holes and causes it is a missing one, aimed where its beam meets the design.
+/// Counts a doubtful return. For holes and causes it is a missing return, aimed at the point where its beam
+/// meets the design.
 fn doubtful(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
     sorting.tally.doubtful += 1;
     digest(sorting.digests, ping, RecordKind::Doubtful);
@@ -196,7 +198,7 @@ fn doubtful(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &Place
         }
     }
     let Some(Aim { x_m, arc_m }) = aim else { return };
-    // An echo beside the vehicle's outline that isn't wall comes from the vehicle.
+    // A doubtful echo from beside the vehicle's outline comes from the vehicle.
     let cause = match ping.hidden {
         Hidden::No if is_distrusted => Cause::HeadSilent,
         Hidden::No => Cause::MissingReturns,
@@ -208,7 +210,7 @@ fn doubtful(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &Place
     }
 }
 
-/// Point where a beam would have met the design profile.
+/// Point at which a beam would have met the design profile.
 fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -> Option<Aim> {
     let beam = *point - *origin;
     let length_m = Some(beam.norm()).filter(|length_m| *length_m > 0.0)?;
@@ -217,9 +219,9 @@ fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -
     Some(Aim { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
 }
 
-/// Chainage of a sample well beyond either end of the tunnel, and its distance from the end, m.
+/// Chainage of a sample well beyond either end of the tunnel, and the sample's distance from that end, m.
 ///
-/// Heads of a vehicle that turns at an end reach slightly beyond it.
+/// A vehicle that turns at an end has heads slightly beyond the end, which is normal.
 fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
     let Outcome::Sample { point, .. } = ping.outcome else { return None };
     let x_m = point.x();
@@ -272,7 +274,7 @@ mod tests {
             }
         }
 
-        /// Filters a ping. Returns the number of samples and of doubtful returns then.
+        /// Filters a ping. Returns the number of samples and the number of doubtful returns so far.
         fn note(&mut self, ping: &PlacedPing) -> (u64, u64) {
             let mut sorting = FilterContext {
                 coverage: &mut self.coverage,
@@ -293,15 +295,15 @@ mod tests {
 
     const STEP_RAD: f64 = 0.0157;
 
-    /// Return with this number in the turn, from the wall at its range or from before it.
+    /// Return with this number in the turn, at this range, m. The wall is at 3 m.
     fn at(number: u32, range_m: f64) -> PlacedPing {
         heard(5.1, 1.0 + STEP_RAD * f64::from(number), range_m)
     }
 
-    /// An isolated echo from before the wall waits for the next return. It then counts as missing in holes
-    /// and causes.
+    /// An isolated echo from before the wall waits for the next return. Then it counts as missing, for holes
+    /// and for causes.
     #[test]
-    fn isolated_return_is_missing_at_its_aim() {
+    fn isolated_echo_is_a_missing_sample_at_its_aim() {
         for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {
             let mut bench = Bench::new();
             assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
@@ -317,9 +319,9 @@ mod tests {
         }
     }
 
-    /// A rock of 0.6 m, wide enough for its height, is wall from its first return on.
+    /// A rock of 0.6 m in height is wide enough to be wall from its first return on.
     #[test]
-    fn waiting_return_is_wall_once_others_agree() {
+    fn waiting_return_is_wall_once_the_next_returns_agree() {
         let mut bench = Bench::new();
         bench.note(&at(0, 3.0));
         let mut found = Vec::new();
@@ -329,7 +331,7 @@ mod tests {
         assert_eq!(found[0], (1, 0), "the first return waits");
         assert_eq!(found.last(), Some(&(20, 0)), "{found:?}");
         assert!(bench.lacks().is_empty() && bench.sweep.waiting.last_mut().is_none());
-        // All are single steps: a pass crosses each.
+        // All are single steps, and a pass crosses each of them.
         let crossed = |number: f64| {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
                 panic!()
@@ -351,7 +353,8 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
     }
 
-    /// A rock's first two returns. Pings while the first one waited count once it is classified.
+    /// The first two returns are from a rock. Pings that come while the first one waits take effect when it
+    /// is classified.
     #[test]
     fn loss_after_a_waiting_return_breaks_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {
@@ -418,9 +421,9 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.outside), (5, 1), "beyond the store");
     }
 
-    /// Sections with samples of a distrusted head are judged again if they have been judged.
+    /// Sections with samples of a distrusted head are judged again if they were judged before.
     #[test]
-    fn sections_seen_by_a_distrusted_head_are_judged_again() {
+    fn judged_sections_with_samples_of_a_distrusted_head_are_judged_again() {
         let mut coverage = coverage();
         let hole = headrace_coverage::Hole {
             diameter_m: 0.3,

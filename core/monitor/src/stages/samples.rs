@@ -1,4 +1,4 @@
-//! Stores samples, and adds their spacings to their sections.
+//! Stores samples, and adds their spacings to the sections.
 
 use crate::entities::{HeadSweep, LastSample};
 use crate::messages::{Outcome, PlacedPing};
@@ -9,7 +9,7 @@ use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
 use headrace_sampling::spacing;
 
-/// Stores a sample and adds its spacings to its section.
+/// Stores a sample, and adds its spacings to its section.
 pub(super) fn note_sample(
     coverage: &mut Coverage,
     sweep: &mut HeadSweep,
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{coverage, heard, pinged, tunnel};
 
-    /// Pings of a tenth of a radian each, 0.3 m along the wall and a centimetre along the tunnel.
+    /// Pings at intervals of a tenth of a radian: 0.3 m along the wall, and a centimetre along the tunnel.
     fn at(step: u32) -> PlacedPing {
         let step = f64::from(step);
         heard(5.05 + 0.01 * step, 0.1 * step, 3.0)
@@ -85,7 +85,7 @@ mod tests {
             assert_eq!(note_sample(&mut coverage, &mut sweep, &tunnel, ping), Ok(()));
             let section = coverage.sections.get(20).unwrap();
             let (samples, steps, t_y_m) = (section.samples, section.t_y_m.count, section.t_y_m.max);
-            // A pass is a single step that crosses an arc length; these are the centres between steps.
+            // Centres of the steps. A pass is a single step that crosses an arc length.
             let passes = [0.5, 1.5, 2.5, 3.5].map(|middle| {
                 let Outcome::Sample { arc_m, .. } = heard(5.1, 0.1 * middle, 3.0).outcome else { panic!() };
                 coverage.store.nearest_pass_m(5.1, arc_m, 1.0).is_some()
@@ -96,22 +96,22 @@ mod tests {
         assert_eq!((samples, steps), (1, 0));
         let (samples, steps, t_y_m, passes) = note(&at(1));
         assert_eq!((samples, steps, passes), (2, 1, [true, false, false, false]));
-        // The chord of a tenth of a radian at 3 m, and a centimetre along.
+        // A step is the chord of a tenth of a radian at 3 m, and a centimetre along the tunnel.
         let chord_m = 2.0 * 3.0 * math::sin(0.05);
         assert!((t_y_m - math::hypot(chord_m, 0.01)).abs() < 1e-9, "{t_y_m}");
-        // After a lost ping the next step isn't single, but its spacing is measured.
+        // After a lost ping the next step isn't single, but the spacing is still measured.
         note(&pinged(5.07, 0.2));
         let (samples, steps, t_y_m, passes) = note(&at(3));
         assert_eq!((samples, steps, passes), (3, 2, [true, false, false, false]));
         assert!((t_y_m - math::hypot(6.0 * math::sin(0.1), 0.02)).abs() < 1e-9, "{t_y_m}");
-        // A step that isn't single, and a sample of a new sweep, which has no previous one.
+        // A step that isn't single, then the first sample of a new sweep, which has no previous sample.
         let (samples, steps, _, passes) = note(&PlacedPing { single_step: false, ..at(4) });
         assert_eq!((samples, steps, passes), (4, 3, [true, false, false, false]));
         let (samples, steps, ..) = note(&PlacedPing { new_sweep: true, ..at(5) });
         assert_eq!((samples, steps), (5, 3));
     }
 
-    /// A turn later, 0.2 m further on, half way between two steps of the first turn.
+    /// The sample comes a turn later, 0.2 m further on, half way between two samples of the first turn.
     #[test]
     fn distance_to_the_previous_pass_is_along_the_tunnel() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
@@ -119,7 +119,7 @@ mod tests {
             note_sample(&mut coverage, &mut sweep, &tunnel, &ping).unwrap();
         }
         let section = coverage.sections.get(20).unwrap();
-        // The pass crossed there at 5.055 m. Each sample of the first turn lies on the step that ends at it.
+        // There, the first turn's pass was at 5.055 m. Each sample of that turn ends a step.
         assert!((section.t_x_m.max - 0.18).abs() < 1e-9, "{:?}", section.t_x_m);
         assert_eq!((section.samples, section.t_y_m.count), (4, 2));
     }

@@ -1,4 +1,5 @@
-//! Speed of sound during the dive, from a depth sensor's temperature. Sonar readings are corrected for it.
+//! Speed of sound during the dive, from the temperature of a depth sensor. Sonar readings are corrected for
+//! it.
 
 use bevy_ecs::prelude::Resource;
 
@@ -7,28 +8,28 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{Decoded, Reading, SourceId};
 
-/// Plausible water temperatures, degrees Celsius. Outside this range the sensor is faulty or out of the
+/// Plausible water temperatures, degrees Celsius. Outside this range the sensor is faulty or not in the
 /// water.
 const WATER_DEGC: core::ops::RangeInclusive<f64> = 0.0..=40.0;
-/// Low-pass time constant, s: faster changes are sensor noise.
+/// Time constant of the low-pass filter, s. Faster changes are sensor noise.
 const SLOWNESS_S: f64 = 60.0;
 
 /// The current speed of sound.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct SoundSpeed {
-    /// Depth sensor that supplies it; `None` to use the site's.
+    /// Depth sensor that supplies the speed; `None` if the site's speed applies.
     source: Option<SourceId>,
     site_mps: f64,
     now_mps: f64,
     heard: Option<MonoNs>,
-    /// Minimum and maximum so far, m/s.
+    /// Minimum and maximum speed so far, m/s.
     span_mps: [f64; 2],
 }
 
 stateful!(SoundSpeed { state: now_mps, heard, span_mps; fixed: source, site_mps; });
 
 impl SoundSpeed {
-    /// Uses the site's speed until `source` supplies another.
+    /// Creates the state with the site's speed, which applies until `source` supplies another.
     pub(crate) fn new(site_mps: f64, source: Option<SourceId>) -> Self {
         Self { source, site_mps, now_mps: site_mps, heard: None, span_mps: [site_mps; 2] }
     }
@@ -40,8 +41,8 @@ impl SoundSpeed {
 
     /// Updates the speed from a depth sensor, and corrects sonar readings.
     ///
-    /// Consumers rescale ranges to the site's speed, so the speed stated by the device is scaled by site over
-    /// current speed.
+    /// Later stages rescale ranges to the site's speed. The speed stated by the device is therefore
+    /// multiplied by the ratio of the site's speed to the current one.
     pub(super) fn pass(&mut self, source: SourceId, decoded: &mut Decoded) {
         match &mut decoded.reading {
             Reading::Pressure(water)
@@ -73,7 +74,7 @@ impl SoundSpeed {
     }
 
     fn corrected(&self, device_mps: f64) -> f64 {
-        // Without a measurement the reading stays bit-identical.
+        // Without a measured speed the reading is unchanged, bit for bit.
         if self.heard.is_none() { device_mps } else { device_mps * (self.site_mps / self.now_mps) }
     }
 }
@@ -92,7 +93,7 @@ mod tests {
         Decoded { valid_at: MonoNs(0) + DurNs::from_secs_f64(at_s), reading: Reading::Pressure(water) }
     }
 
-    /// Corrected range of 4 m, computed by a device with 1500 m/s.
+    /// Corrected range, m, if a device that assumes 1500 m/s reports 4 m.
     fn metres(sound: &mut SoundSpeed, site: &Site) -> f64 {
         let echo = EchoRange { range_m: Some(4.0), confidence: 1.0, sound_speed_mps: 1500.0 };
         let mut decoded = Decoded { valid_at: MonoNs(0), reading: Reading::Echo(echo) };
@@ -102,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_use_the_measured_water() {
+    fn ranges_are_corrected_to_the_measured_speed_of_sound() {
         let site = Site::default();
         let mut sound = SoundSpeed::new(site.sound_speed_mps, Some(DEPTH));
         assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);
@@ -116,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_smoothed_and_a_change_is_followed() {
+    fn temperature_noise_is_smoothed_and_a_lasting_change_is_followed() {
         let site = Site::default();
         let mut sound = SoundSpeed::new(site.sound_speed_mps, Some(DEPTH));
         for tick in 0..20_000 {

@@ -14,7 +14,7 @@ fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
     Advice { reason, v_max_mps, predicted_t_m: Some(t_m), will_exceed: t_m > 0.5, ..none }
 }
 
-/// Two heads and another sensor, all heard at 10 s, at 0.07 m/s where 0.07 m/s is allowed.
+/// Two heads and another sensor, all last heard at 10 s. The speed and its limit are 0.07 m/s.
 pub(crate) fn state() -> LiveState {
     let mut heard = LiveState::new(0.5, 2.0, 0b11, 3).heard;
     heard[..3].fill(Some(at(10)));
@@ -52,7 +52,7 @@ fn lamp_follows_the_ratio_of_speed_to_limit() {
     );
 }
 
-/// Any speed is fine over wall that has passed, unless the position is doubtful or there is no sonar.
+/// Over wall that has passed any speed is fine, unless the position is doubtful or there is no sonar.
 #[test]
 fn any_speed_is_fine_over_passed_wall() {
     let back = LiveState { passed: true, speed_mps: Some(-0.3), ..state() };
@@ -66,7 +66,8 @@ fn any_speed_is_fine_over_passed_wall() {
     assert_eq!(mute.condition(), Condition::NoSonar);
 }
 
-/// A missed stretch is passed again from the turning point. The way back counts, too, if it is slow enough.
+/// The vehicle passes a missed stretch again from the turning point on. Its way back gives coverage, too, if
+/// it is slow enough.
 #[test]
 fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
     let back = LiveState { back_to_m: Some(8.2), speed_mps: Some(-0.3), ..state() };
@@ -79,14 +80,14 @@ fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
 }
 
 #[test]
-fn missing_turn_within_the_limit_is_reported_while_it_misses() {
+fn failing_turn_within_v_max_is_reported_until_the_forecast_meets_the_target() {
     let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };
     let told = |t_m| LiveState { advice: Some(forecast(t_m)), ..state() }.condition();
     assert_eq!([told(0.6), told(0.4)], [Condition::TurnFails, Condition::Good]);
 }
 
 #[test]
-fn turn_within_position_error_of_the_target_is_not_good() {
+fn forecast_within_the_position_error_of_the_target_is_not_good() {
     let forecast = |may_exceed, will_exceed| Advice {
         may_exceed,
         will_exceed,
@@ -125,7 +126,7 @@ fn missing_data_takes_precedence_over_doubtful_data() {
 }
 
 #[test]
-fn state_gets_stale_as_ticks_continue_without_data() {
+fn state_becomes_stale_as_ticks_continue_without_data() {
     let after = |ms: u64| LiveState { now: MonoNs(at(10).0 + ms * 1_000_000), ..state() };
     assert_eq!([after(2000), after(2001)].map(|state| state.is_old()), [false, true]);
     assert_eq!(
@@ -137,7 +138,7 @@ fn state_gets_stale_as_ticks_continue_without_data() {
 }
 
 #[test]
-fn sensors_report_their_state() {
+fn sensor_is_ok_stalled_or_silent_by_its_readings() {
     let mut state = state();
     state.heard[2] = None;
     state.turning = 0b01;
@@ -146,17 +147,17 @@ fn sensors_report_their_state() {
     assert_eq!(state.silent().collect::<Vec<_>>(), [2]);
 }
 
-/// Heads are up to half a metre before or behind the origin. Coverage counts until no head can be inside the
-/// tunnel.
+/// Heads are up to half a metre before or behind the origin. Coverage counts as long as a head can be inside
+/// the tunnel.
 #[test]
-fn outside_the_tunnel_nothing_is_inspected() {
+fn condition_is_outside_only_if_no_head_can_be_inside() {
     let at = |x_m: f64| LiveState { chainage_m: Some(x_m), length_m: 100.0, heads_reach_m: 0.5, ..state() };
     let shown = [-0.6, -0.4, 50.0, 100.4, 100.6].map(|x_m| at(x_m).condition());
     let [before, inside @ .., beyond] = shown;
     assert_eq!([before, beyond], [Condition::Outside(0.0), Condition::Outside(100.0)]);
     assert_eq!(inside, [Condition::Good; 3]);
     assert_eq!((beyond.as_str(), beyond.lamp()), ("outside", Lamp::Amber));
-    // An unreliable position takes precedence.
+    // A doubtful position takes precedence.
     let unsure = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..at(100.6) };
     assert_eq!(unsure.condition(), Condition::CannotSay(PositionDoubt::Cable));
 }

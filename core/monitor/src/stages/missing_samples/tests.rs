@@ -9,7 +9,7 @@ use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::SourceId;
 
-/// A ping made without a fix, with or without a return.
+/// A real ping without a fix, with or without a return.
 fn away(at_ms: u64, outcome: Outcome) -> PlacedPing {
     let at = MonoNs(at_ms * 1_000_000);
     PlacedPing {
@@ -30,7 +30,7 @@ fn away(at_ms: u64, outcome: Outcome) -> PlacedPing {
     }
 }
 
-/// An angle counts as hidden once seven in ten of its pings get no return. Only the latest hundreds of pings
+/// An angle counts as hidden once seven in ten of its pings give no return. Only the last few hundred pings
 /// count.
 #[test]
 fn angle_is_hidden_if_most_pings_get_no_return() {
@@ -48,8 +48,8 @@ fn angle_is_hidden_if_most_pings_get_no_return() {
     assert!(!hides([10_000, 400]), "the last hundreds of pings got returns");
 }
 
-/// A simulated head loses as often, and in runs as long, as while it was heard. The same pings give the same
-/// losses.
+/// The simulated pings of a silent head are lost as often, and in runs as long, as its real pings were. The
+/// same times always give the same losses.
 #[test]
 fn simulated_losses_match_rate_and_run_length() {
     let lost = |rate: LossRate| {
@@ -70,7 +70,7 @@ fn simulated_losses_match_rate_and_run_length() {
 }
 
 #[test]
-fn pings_without_a_fix_are_kept_up_to_capacity_and_overflow_is_recorded() {
+fn pings_without_a_fix_beyond_the_capacity_are_dropped_and_recorded() {
     let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
     let unplaced = Outcome::Unplaced(headrace_fusion::NoFix::Chainage);
     let missing = Outcome::Lost(Loss::Missing, None);
@@ -93,7 +93,7 @@ fn all_of(causes: &[Cause]) -> Causes {
     causes.iter().fold(Causes::default(), |all, cause| all.with(*cause))
 }
 
-/// Losses at angles assumed to be hidden are due to occlusion, unless the wall is detected there after all.
+/// At angles assumed to be hidden, losses are due to occlusion, unless other pings there do detect the wall.
 #[test]
 fn loss_at_hidden_angle_is_missing_once_others_return() {
     let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
@@ -120,8 +120,8 @@ fn loss_at_hidden_angle_is_missing_once_others_return() {
     assert!(lacking.stalled.has(1) && !lacking.stalled.has(0));
 }
 
-/// To the left, with the wall 3 m away and the vehicle turned to the left by 0.1 rad, the beam meets it 3 tan
-/// 0.1 m astern.
+/// The head looks to the left, at wall 3 m away, and the vehicle is turned to the left by 0.1 rad. The beam
+/// then meets the wall 3 tan 0.1 m astern.
 #[test]
 fn lost_ping_is_missing_at_its_aim_with_all_causes() {
     let profile = pipe();
@@ -219,8 +219,8 @@ impl Dive {
         lacks_of(&self.coverage.lacks)
     }
 
-    /// Whether missing samples are those of the pings after 10 s, in order, each at the head's expected
-    /// place.
+    /// Whether the missing samples are those of the pings after 10 s: in order, and each at the head's
+    /// expected place.
     fn are_pings_after_10_s(&self, lacks: &[MissingSample], why: &[Cause]) -> bool {
         let [y_m, z_m] = self.profile.reference();
         (1_u32..).zip(lacks).all(|(ping, lack)| {
@@ -238,20 +238,20 @@ impl Dive {
 fn silent_head_is_missing_at_its_extrapolated_angles() {
     let mut dive = Dive::new();
     assert_eq!(dive.beat(10.2, true).len(), 0, "the head may still ping");
-    // One second of pings, and another.
+    // The missing samples are those of one second, then those of two.
     let first = dive.beat(11.0, true);
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadSilent]), "{first:?}");
     let second = dive.beat(12.0, true);
     assert!(second.len() == 100 && dive.are_pings_after_10_s(&second, &[Cause::HeadSilent]));
-    // A head that pings but is stalled.
+    // The head pings, but is stalled.
     let mut dive = Dive::new();
     dive.lacking.heads[0].pinged = Some(at(10.9));
     let first = dive.beat(11.0, true);
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadStalled]));
 }
 
-/// Without a fix, pings are missing for that reason, too. They are placed along the track once there is a fix
-/// again.
+/// Pings without a fix have this as an additional cause. They are placed along the track as soon as there is
+/// a fix again.
 #[test]
 fn simulated_pings_without_a_fix_are_placed_later() {
     let mut dive = Dive::new();
@@ -261,10 +261,10 @@ fn simulated_pings_without_a_fix_are_placed_later() {
     assert_eq!((all.len(), dive.lacking.away.len(), dive.lacking.forgot), (100, 0, false));
     assert!(dive.are_pings_after_10_s(&all[..50], &[Cause::HeadSilent, Cause::PositionLost]), "{all:?}");
     assert!(all[50..].iter().all(|lack| lack.why == Causes::of(Cause::HeadSilent)));
-    // Their speed is that between the two fixes.
+    // Their speed is the mean speed between the two fixes.
     let section = dive.coverage.sections.get(8).unwrap();
     assert!((section.passage.drive.speed_mps - 0.1).abs() < 1e-9, "{:?}", section.passage.drive);
-    // If there are more than fit, the first ones are kept.
+    // If the capacity is exceeded, the first pings are kept.
     let mut dive = Dive::new();
     dive.beat(10.0, true);
     dive.beat(10.0 + 0.02 * (ROOM as f64 + 500.0), false);
@@ -280,9 +280,9 @@ fn simulated_pings_without_a_fix_are_placed_later() {
     );
 }
 
-/// After a gap in a log the work of an update is bounded, and the omission is recorded.
+/// After a gap in a log, the work of an update stays bounded, and the dropped pings are recorded.
 #[test]
-fn overdue_pings_keep_the_latest() {
+fn gap_in_the_log_keeps_only_the_latest_simulated_pings() {
     for (owed, is_forgotten) in [(ROOM, false), (ROOM + 1, true)] {
         let mut dive = Dive::new();
         dive.beat(10.0, true);
@@ -293,18 +293,20 @@ fn overdue_pings_keep_the_latest() {
     }
 }
 
-/// Draws by time are as even as random draws, whatever the time between pings, and no two are equal.
+/// Random numbers from times are evenly distributed, whatever the interval between the times, and no two are
+/// equal.
 #[test]
-fn draws_by_time_are_evenly_spread() {
+fn random_numbers_from_times_are_evenly_distributed() {
     for period_ns in [1_u64, 18_000_000, 20_000_000, 1 << 30, 1_000_000_000] {
         let draws: Vec<f64> = (0..16_384).map(|k| unit_of(3_600_000_000_000 + k * period_ns)).collect();
         let mut counts = [0_i32; 16];
         for draw in &draws {
             counts[usize::try_from(math::floor_to_i64(16.0 * draw)).unwrap()] += 1;
         }
-        // 1024 each, within five standard deviations.
+        // 1024 are expected in each class. The tolerance is five standard deviations.
         assert!(counts.iter().all(|count| (count - 1024).abs() < 160), "{period_ns}: {counts:?}");
-        // Draws after one in the lower half are as even: neighbours are independent.
+        // After a number in the lower half, the next one is evenly distributed, too: neighbours are
+        // independent.
         let after_low = draws.windows(2).filter(|pair| pair[0] < 0.5 && pair[1] < 0.5).count();
         assert!(after_low.abs_diff(4096) < 300, "{period_ns}: {after_low}");
         let mut sorted = draws;
