@@ -108,7 +108,7 @@ pub enum Figures {
     /// Speed and advice.
     Advice(AdviceFigures),
     /// Missing requirements for a position.
-    MissingSampleFinder(NoFix),
+    MissingRequirement(NoFix),
     /// Position error, m, and whether staying stationary would reduce it.
     Error(f64, bool),
     /// Alert about the dive as a whole: place, m, and largest deviation, m.

@@ -129,7 +129,7 @@ impl AlertList {
     fn take_position(&mut self, beat: &Beat<'_>, begun: MonoNs, to: &mut Telling<'_>) {
         let Beat { at, state, .. } = *beat;
         let (lacks, figures) = match state.position {
-            PositionState::None(lacking) => (true, Figures::MissingSampleFinder(lacking)),
+            PositionState::None(lacking) => (true, Figures::MissingRequirement(lacking)),
             _ => (false, Figures::None),
         };
         // Navigation needs time to align before it gives the first position.

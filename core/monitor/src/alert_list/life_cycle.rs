@@ -57,7 +57,7 @@ impl Figures {
             Self::Missed(_, _, at_most_mps) => at_most_mps,
             Self::CannotSay(stretch) => stretch.largest().hole_m[0],
             Self::Advice(figures) => figures.speed_mps,
-            Self::MissingSampleFinder(lacking) => f64::from(lacking as u8),
+            Self::MissingRequirement(lacking) => f64::from(lacking as u8),
             Self::Error(figure, _) | Self::Left(figure) | Self::Deviation(_, figure) => figure,
             Self::Setting(doubt, _) => doubt.setting.figure(),
         }

@@ -94,7 +94,7 @@ impl ListedAlert {
                 )
             }
             (_, Figures::Advice(figures)) => advice_text(figures, around.profile, around.heads),
-            (_, Figures::MissingSampleFinder(lacking)) => no_position_text(*lacking).to_owned(),
+            (_, Figures::MissingRequirement(lacking)) => no_position_text(*lacking).to_owned(),
             (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
             (kind, Figures::Deviation(x_m, off_m)) => match kind.of_dive() {
                 Some(of_dive) => place_first(&alert_text(of_dive, &name, *x_m, *off_m), *x_m),
