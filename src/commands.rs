@@ -221,7 +221,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     }
     note_losses(&mut report, log, &player);
     if player.coming()?.is_none() {
-        report.what_if = other_targets::reports(args, &files, (vehicle, &text), &report)?;
+        report.other_targets = other_targets::reports(args, &files, (vehicle, &text), &report)?;
     } else if other_targets::is_asked(args) {
         tracing::warn!(
             "other targets and sections aren't evaluated: the replay was stopped before the end of the log"

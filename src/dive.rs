@@ -394,7 +394,7 @@ impl Dive {
                 opened: history.opened,
                 lost: history.lost,
                 dropped_packets: history.dropped,
-                strangers: history.strangers,
+                ignored: history.strangers,
                 status: history.last,
             });
         }

@@ -389,7 +389,7 @@ impl Served {
 
 /// Last message of a dive to its page.
 pub(crate) fn end_message(report: &Report) -> Value {
-    json!({"type": "end", "digest": report.digest, "summary": report.summary, "way": report.way,
+    json!({"type": "end", "digest": report.digest, "summary": report.summary, "way": report.coverage_extent,
         "exit": exit_code(report)})
 }
 

@@ -59,7 +59,7 @@ pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
     // If the report can't be written, the summary is still printed.
     let written = output.report.as_ref().map_or(Ok(()), |path| files::write_json(path, report));
     if output.json_lines {
-        let end = json!({"type": "end", "digest": report.digest, "way": report.way, "summary": report.summary,
+        let end = json!({"type": "end", "digest": report.digest, "way": report.coverage_extent, "summary": report.summary,
             "not_inspected": report.not_inspected, "exit_code": exit_code(report)});
         deliver(&end.to_string())?;
     } else if output.json {

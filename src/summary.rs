@@ -30,12 +30,12 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     if let Some(why) = &report.not_inspected {
         line(not_inspected_text(why, dive));
     }
-    if let (Some(from_m), Some(to_m)) = (report.way.from_m, report.way.to_m) {
+    if let (Some(from_m), Some(to_m)) = (report.coverage_extent.from_m, report.coverage_extent.to_m) {
         line(format!(
             "{} to {}: {:.2} m in {:.0} s, {} samples, target {} m",
             station(from_m),
             station(to_m),
-            report.way.length_m,
+            report.coverage_extent.length_m,
             dive.duration_s,
             dive.samples_valid,
             report.target_m,
@@ -44,7 +44,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
         for stretch in stretches(report) {
             line(stretch);
         }
-        for other in &report.what_if {
+        for other in &report.other_targets {
             let OtherTargetReport { target_m, section_m, .. } = other;
             line(format!("  with target {target_m} m in sections of {section_m} m: {}", metres(other)));
         }
@@ -71,7 +71,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
         line(silent);
     }
     for source in &report.sources {
-        let strangers = source.line.as_ref().map_or(0, |line| line.strangers);
+        let strangers = source.line.as_ref().map_or(0, |line| line.ignored);
         if strangers > 0 {
             line(format!(
                 "  {strangers} messages on the line of {} came from other devices and were ignored",
@@ -146,7 +146,7 @@ fn silence(source: &SourceReport) -> Option<String> {
 /// Text on the reason for which a dive is no inspection.
 fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     let lacking = why
-        .lacking
+        .missing
         .map_or_else(|| "position".to_owned(), |lacking| lacking.trim_start_matches("no_").replace('_', " "));
     let text = match why.reason {
         "no_sonar" => {
@@ -192,7 +192,7 @@ fn stretches(report: &Report) -> Vec<String> {
     // Sections that were passed again and have no verdict are listed as unsure.
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none()).filter(fails);
     let mut all: Vec<(f64, String)> = open.map(|run| (run.start_m, missed(run, report))).collect();
-    all.extend(report.unsure.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
+    all.extend(report.no_verdict.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all.into_iter().map(|(_, text)| text).collect()
 }
@@ -201,7 +201,7 @@ fn missed(run: &RunReport, report: &Report) -> String {
     let heads = &report.heads;
     let figures = run.figures.as_ref();
     let cause = figures.map_or_else(|| run.cause.as_str().to_owned(), |figures| cause_text(figures, heads));
-    let back = report.way_home.iter().find(|back| back.run == run.id);
+    let back = report.go_back.iter().find(|back| back.run == run.id);
     let action = back
         .map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps, heads)));
     // The rest of the run passes, or no longer has a verdict.

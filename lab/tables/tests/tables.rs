@@ -119,7 +119,7 @@ fn tables_match_reports() {
             &[
                 ("digest", "/digest"),
                 ("target_m", "/target_m"),
-                ("way_m", "/way/length_m"),
+                ("way_m", "/coverage_extent/length_m"),
                 ("pass_m", "/summary/pass_m"),
                 ("fail_m", "/summary/fail_m"),
                 ("cannot_say_m", "/summary/cannot_say_m"),

@@ -12,7 +12,7 @@ use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
 use headrace_monitor::live_text::{message_line, status_line};
 use headrace_monitor::messages::{Notice, Outcome as Placing, Placed, PlacedList};
-use headrace_monitor::report::way_home;
+use headrace_monitor::report::go_back;
 use headrace_monitor::result_stream::{RecordKind, first_record};
 use headrace_monitor::run::Loop;
 use headrace_sensor::device::{SensorInfo, SensorKind};
@@ -489,7 +489,7 @@ impl Collector {
         }
         self.back_due = false;
         let (legs, mut at_m, mut way_m) =
-            (way_home(&dive.coverage().sections), dive.live_state().chainage_m, 0.0);
+            (go_back(&dive.coverage().sections), dive.live_state().chainage_m, 0.0);
         let mut time_s = Some(0.0);
         let mut shown = Vec::new();
         for leg in &legs {

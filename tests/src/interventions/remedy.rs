@@ -42,7 +42,7 @@ pub fn remedies(dive: &InterventionDive) -> Vec<Remedied> {
     let of_run = |told: &ReturnReport| -> Vec<Judged> {
         dive.sections.iter().filter(|section| section.run == Some(told.run)).cloned().collect()
     };
-    let runs = dive.report.way_home.iter().map(|told| (told, of_run(told)));
+    let runs = dive.report.go_back.iter().map(|told| (told, of_run(told)));
     runs.filter(|(_, sections)| !sections.is_empty())
         .map(|(told, sections)| remedy(dive, told, &sections))
         .collect()

@@ -86,7 +86,7 @@ fn missed_stretch_is_announced_again_when_its_cause_changes() {
         assert_eq!(flag["run"], run["id"]);
         assert!(run["causes"].as_array().unwrap().contains(&flag["cause"]), "{run}");
     }
-    let actions = &report["way_home"][0]["actions"];
+    let actions = &report["go_back"][0]["actions"];
     assert!(
         ["slower", "head_back"].iter().all(|action| actions.as_array().unwrap().contains(&(*action).into()))
     );

@@ -183,8 +183,8 @@ fn fail_that_only_a_higher_speed_mends_is_attributed_to_phase() {
         println!("{speed_mps} m/s: {of_phase} of {} failed sections are put down to the phase", causes.len());
         assert!(causes.len() >= 20 && 20 * of_phase >= 19 * causes.len(), "{speed_mps} m/s: {causes:?}");
         let back =
-            report.way_home.iter().find(|back| back.actions.contains(&headrace_coverage::Action::InPhase));
+            report.go_back.iter().find(|back| back.actions.contains(&headrace_coverage::Action::InPhase));
         let at_mps = back.map_or(0.0, |back| back.at_most_mps);
-        assert!((at_mps - 0.1).abs() < 1e-9, "{:?}", report.way_home);
+        assert!((at_mps - 0.1).abs() < 1e-9, "{:?}", report.go_back);
     }
 }

@@ -35,9 +35,13 @@ const ALL: &str = r#""sonar_0", "sonar_1", "sonar_2", "sonar_3""#;
 #[track_caller]
 fn accounted_for(what: &str, report: &Report) {
     let all_m = report.summary.way_m();
-    assert!((all_m - report.way.length_m).abs() < 1e-9, "{what}: {all_m} m of {:?}", report.way);
+    assert!(
+        (all_m - report.coverage_extent.length_m).abs() < 1e-9,
+        "{what}: {all_m} m of {:?}",
+        report.coverage_extent
+    );
     let ends = (report.sections.first().map(|s| s.start_m), report.sections.last().map(|s| s.end_m));
-    assert_eq!(ends, (report.way.from_m, report.way.to_m), "{what}");
+    assert_eq!(ends, (report.coverage_extent.from_m, report.coverage_extent.to_m), "{what}");
     assert!(
         report.sections.windows(2).all(|pair| pair[0].end_m.to_bits() == pair[1].start_m.to_bits()),
         "{what}"
@@ -71,7 +75,7 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
     // The heads die at 5.2 m, with the rear heads at 4.65 m.
     let report = steady(9.0, &silence(ALL, "from_s = 20"));
     accounted_for("dead", &report);
-    assert!(report.way.to_m.unwrap() > START_M + 9.0, "{:?}", report.way);
+    assert!(report.coverage_extent.to_m.unwrap() > START_M + 9.0, "{:?}", report.coverage_extent);
     let dark: Vec<_> =
         report.sections.iter().filter(|s| s.start_m >= 6.0 && s.end_m <= 12.0 - HEAD_M - 0.5).collect();
     assert!(dark.len() > 16);
@@ -82,7 +86,7 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
         // section's start is left, since a circle about it may be large enough.
         assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
-    let home = report.way_home.iter().map(|back| back.from_m).fold(0.0, f64::max);
+    let home = report.go_back.iter().map(|back| back.from_m).fold(0.0, f64::max);
     assert!(home > 10.5, "the way home goes to where the vehicle went: {home}");
     let run = report.runs.iter().find(|run| run.cause.as_str() == "head_silent").unwrap();
     assert_eq!(run.silent_sources, ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]);
@@ -137,11 +141,12 @@ fn start_and_turning_point_get_no_flag_and_no_default_pass() {
         assert_ne!(section.verdict, "fail", "{}", section.start_m);
     }
     let at_ends: Vec<_> = report.sections.iter().filter(|s| s.not_inspected).collect();
-    assert!(at_ends.iter().any(|s| s.end_m <= front_m + 0.25), "at the beginning: {:?}", report.unsure);
+    assert!(at_ends.iter().any(|s| s.end_m <= front_m + 0.25), "at the beginning: {:?}", report.no_verdict);
     assert!(at_ends.iter().all(|s| s.verdict == "open" && s.hole_m.unwrap() > report.target_m));
     assert!(report.sections.iter().filter(inside).all(|s| s.verdict == "pass"), "{:?}", report.runs);
-    let told: f64 = report.unsure.iter().filter(|s| s.why == "not_inspected").map(|s| s.unsure_m).sum();
-    assert!((told - report.summary.not_inspected_m).abs() < 1e-9 && told > 0.0, "{:?}", report.unsure);
+    let told: f64 =
+        report.no_verdict.iter().filter(|s| s.why == "not_inspected").map(|s| s.no_verdict_m).sum();
+    assert!((told - report.summary.not_inspected_m).abs() < 1e-9 && told > 0.0, "{:?}", report.no_verdict);
 }
 
 #[test]
@@ -225,7 +230,11 @@ fn verdict_lengths_add_up_wherever_a_dive_begins_turns_and_ends() {
         let report = instrumented::dive(&vehicle, &scene).report;
         accounted_for(&format!("seed {seed}"), &report);
         let reason = report.not_inspected.as_ref().map(|why| why.reason);
-        assert_eq!(report.way.from_m.is_none(), reason == Some("outside_tunnel"), "seed {seed}: {reason:?}");
+        assert_eq!(
+            report.coverage_extent.from_m.is_none(),
+            reason == Some("outside_tunnel"),
+            "seed {seed}: {reason:?}"
+        );
         outside += usize::from(reason == Some("outside_tunnel"));
         not_inspected_m += report.summary.not_inspected_m;
     }
@@ -245,7 +254,7 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
         let report = &dive.report;
         let what = format!("seed {seed}");
         accounted_for(&what, report);
-        let Some(to_m) = report.way.to_m else { continue };
+        let Some(to_m) = report.coverage_extent.to_m else { continue };
         // Heads are at most 0.6 m from the vehicle, in either direction; a section is left by half the target.
         let (target_m, section_m) = (report.target_m, report.section_m);
         let seen_m = dive.samples().map(|sample| sample.place[0]).fold(f64::NEG_INFINITY, f64::max);
@@ -297,11 +306,11 @@ fn dive_without_a_position_judges_nothing_and_says_so_first() {
         let (code, report) = folder.replay("dive.mcap", &[]);
         let why = &report["not_inspected"];
         assert_eq!(
-            (code, &why["reason"], &why["lacking"]),
+            (code, &why["reason"], &why["missing"]),
             (Some(1), &"no_position".into(), &lacking.into())
         );
         assert_eq!(why["silent_sources"], serde_json::json!([sensor]));
-        assert_eq!(report["way"]["length_m"], 0.0);
+        assert_eq!(report["coverage_extent"]["length_m"], 0.0);
     }
 }
 
@@ -312,7 +321,7 @@ fn dive_outside_the_tunnel_exits_with_1() {
     folder.write("scene.toml", SCENE.replace("start_m = 3", "start_m = 105"));
     folder.simulate("scene.toml", "dive.mcap");
     let (code, report) = folder.replay("dive.mcap", &[]);
-    assert_eq!((code, &report["way"]["length_m"]), (Some(1), &0.0.into()));
+    assert_eq!((code, &report["coverage_extent"]["length_m"]), (Some(1), &0.0.into()));
     assert_eq!(report["not_inspected"]["reason"], "outside_tunnel");
     let answer = folder.headrace(&["replay", "dive.mcap"]);
     let said = "NO VERDICTS: the heads were outside the tunnel from 0+105.20 to 0+109.00: check";
@@ -329,7 +338,7 @@ fn dive_mostly_without_a_position_exits_with_1() {
     let (code, report) = folder.replay("dive.mcap", &[]);
     assert_eq!(code, Some(1), "{}", report["not_inspected"]);
     assert_eq!(report["not_inspected"]["reason"], "mostly_no_position");
-    assert!(report["way"]["length_m"].as_f64().unwrap() > 0.0);
+    assert!(report["coverage_extent"]["length_m"].as_f64().unwrap() > 0.0);
     let answer = folder.headrace(&["replay", "dive.mcap"]);
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
 }
@@ -348,8 +357,13 @@ fn waiting_for_a_known_heading_leaves_no_undecided_metre() {
     );
     let report = instrumented::dive(&vehicle, &scene).report;
     accounted_for("waited", &report);
-    assert!(report.summary.cannot_say_m <= 0.25, "{} m: {:?}", report.summary.cannot_say_m, report.unsure);
+    assert!(
+        report.summary.cannot_say_m <= 0.25,
+        "{} m: {:?}",
+        report.summary.cannot_say_m,
+        report.no_verdict
+    );
     let inside =
         |s: &&SectionReport| s.start_m > START_M + HEAD_M + 0.25 && s.end_m < START_M + 6.0 - HEAD_M - 0.5;
-    assert!(report.sections.iter().filter(inside).all(|s| s.verdict == "pass"), "{:?}", report.unsure);
+    assert!(report.sections.iter().filter(inside).all(|s| s.verdict == "pass"), "{:?}", report.no_verdict);
 }

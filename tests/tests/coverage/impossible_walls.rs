@@ -87,13 +87,13 @@ fn declared_opening_is_listed_and_does_not_fail() {
 fn several_targets_give_the_same_verdicts_as_single_runs() {
     let folder = Folder::with_dive();
     let (_, together) = folder.replay("dive.mcap", &["--target", "0.5,1.2,2", "--section", "0.25,1"]);
-    let others = together["what_if"].as_array().unwrap();
+    let others = together["other_targets"].as_array().unwrap();
     assert_eq!(others.len(), 6);
     for other in others {
         let of = |key: &str| other[key].as_f64().unwrap();
         let (target, section) = (of("target_m").to_string(), of("section_m").to_string());
         let (_, alone) = folder.replay("dive.mcap", &["--target", &target, "--section", &section]);
-        assert!(alone["what_if"].as_array().unwrap().is_empty());
+        assert!(alone["other_targets"].as_array().unwrap().is_empty());
         for verdict in ["pass", "fail", "cannot_say", "open"] {
             let (a, b) = (of(&format!("{verdict}_m")), metres(&alone, verdict));
             assert!((a - b).abs() <= 1e-9, "target {target}, sections {section}: {verdict} {a}, alone {b}");

@@ -339,7 +339,7 @@ fn unfinished_replay_is_not_judged_by_other_targets() {
     let arguments = ["ticks.mcap", "--speed", "1x", "--target", "0.5,0.3", "--report", "left.json"];
     let answer = interactive(&folder, &arguments, "pause\nseek 12s\nend\n");
     let report: Value = serde_json::from_slice(&folder.read("left.json")).unwrap();
-    assert_eq!(report["what_if"], serde_json::json!([]));
+    assert_eq!(report["other_targets"], serde_json::json!([]));
     let said = String::from_utf8_lossy(&answer.stderr);
     assert!(said.contains("the replay was stopped before the end of the log"), "{said}");
 }

@@ -101,7 +101,7 @@ fn dive_is_compared_with_a_second_target() {
     let section_m = viewer.hello["section_m"].as_f64().unwrap();
     let mut apart_m = 0.0;
     for (other, key) in [(0, "open_m"), (1, "pass_m"), (2, "fail_m"), (3, "cannot_say_m")] {
-        let of = |key: &str| report["what_if"][1][key].as_f64().unwrap();
+        let of = |key: &str| report["other_targets"][1][key].as_f64().unwrap();
         // The page shows sections that aren't inspected as open.
         let reported_m = of(key) + if key == "open_m" { of("not_inspected_m") } else { 0.0 };
         let sections = viewer.sections.values().filter(|section| section.compared == Some(other)).count();
@@ -112,14 +112,14 @@ fn dive_is_compared_with_a_second_target() {
     }
     // The page compares the dive's own holes, and the report comes from a separate replay. They differ at the ends of
     // the covered stretch.
-    let way_m = report["way"]["length_m"].as_f64().unwrap();
+    let way_m = report["coverage_extent"]["length_m"].as_f64().unwrap();
     assert!(
         apart_m <= 0.2 * way_m,
         "{apart_m} of {way_m} m: {}, {}",
         viewer.state["compared"],
-        report["what_if"]
+        report["other_targets"]
     );
-    assert!(report["what_if"][1]["fail_m"].as_f64() > report["what_if"][0]["fail_m"].as_f64());
+    assert!(report["other_targets"][1]["fail_m"].as_f64() > report["other_targets"][0]["fail_m"].as_f64());
 }
 
 #[test]

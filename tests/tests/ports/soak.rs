@@ -125,7 +125,7 @@ fn soak_neither_leaks_nor_drops() {
         first.threads,
         last.threads,
         core * 100.0,
-        report["way"]["length_m"],
+        report["coverage_extent"]["length_m"],
         report["log"]["losses"],
     );
     assert_eq!(dropped, 0);

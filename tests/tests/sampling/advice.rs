@@ -247,7 +247,7 @@ fn way_home_and_advice_give_similar_speeds() {
     {
         let planned_mps = case.planned_mps();
         let dive = case.dive(planned_mps, 1.35 * planned_mps);
-        let again = dive.report.way_home.iter().map(|stop| stop.at_most_mps).fold(f64::INFINITY, f64::min);
+        let again = dive.report.go_back.iter().map(|stop| stop.at_most_mps).fold(f64::INFINITY, f64::min);
         let advised = dive.median(v_max_mps);
         println!("{} {} {}: {again:.4} again, {advised:.4} advised", case.what, case.layout, case.target_m);
         assert!(
@@ -301,8 +301,7 @@ fn advice_compensates_lost_returns() {
         let v_max_mps = case.dive(sound_mps, 0.5 * sound_mps).median(v_max_mps);
         let dives = [v_max_mps, sound_mps].map(|speed_mps| case.dive(sound_mps, speed_mps));
         let [at, as_before] = [0, 1].map(|k| Judged::of(case, &dives[k]));
-        let again =
-            dives[1].report.way_home.iter().map(|stop| stop.at_most_mps).fold(f64::INFINITY, f64::min);
+        let again = dives[1].report.go_back.iter().map(|stop| stop.at_most_mps).fold(f64::INFINITY, f64::min);
         println!(
             "{:<20} {v_max_mps:.4} m/s of {sound_mps:.4}: {:5.1} % pass, {:5.1} % at that without losses; again at {again:.4}",
             case.what,

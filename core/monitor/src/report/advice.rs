@@ -41,7 +41,7 @@ pub struct AdviceReport {
     pub alternatives: Vec<AlternativeReport>,
     /// Speed at which the present mode meets the target if the heads are set in phase again for this speed,
     /// m/s.
-    pub start_anew_for_mps: Option<f64>,
+    pub restart_for_mps: Option<f64>,
     /// Largest speeds with the margins added one by one.
     pub margins: Option<MarginsReport>,
 }
@@ -86,7 +86,7 @@ pub(super) fn advice_report(entry: &AdviceEntry) -> AdviceReport {
         suffices: left.suffices_at(entry.advice.v_max_mps),
         remedy: entry.advice.remedy.map(|remedy| remedy.as_str().to_owned()),
         alternatives: others.map(|other| alternative_report(other, &left)).collect(),
-        start_anew_for_mps: entry.advice.anew.map(|anew| anew.planned_speed_mps),
+        restart_for_mps: entry.advice.anew.map(|anew| anew.planned_speed_mps),
         margins: entry
             .advice
             .margins

@@ -30,7 +30,7 @@ pub struct NotInspectedReport {
     /// Requirement that was missing most often for returns without a position.
     ///
     /// One of `no_heading`, `no_chainage` and `no_place_in_section`.
-    pub lacking: Option<&'static str>,
+    pub missing: Option<&'static str>,
     /// Share of pings without a position.
     pub without_position_share: f64,
     /// Sources that never delivered a reading.
@@ -63,7 +63,7 @@ pub(super) fn not_inspected(dive: &Loop) -> Option<NotInspectedReport> {
     let silent = dive.sources().iter().zip(dive.health()).filter(|(_, health)| health.readings == 0);
     Some(NotInspectedReport {
         reason,
-        lacking: most,
+        missing: most,
         without_position_share: share,
         silent_sources: silent.map(|(source, _)| source.id.clone()).collect(),
     })

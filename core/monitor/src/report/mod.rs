@@ -28,17 +28,17 @@ mod unsure;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use inspected::{CoverageExtentReport, NotInspectedReport};
-pub use runs::{ReturnReport, RunReport, way_home};
+pub use runs::{ReturnReport, RunReport, go_back};
 pub use sections::{DeviationReport, SectionReport};
 pub use smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport};
 pub use spread::SpreadReport;
 use spread::spread_report;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
-pub use unsure::UnsureReport;
+pub use unsure::NoVerdictReport;
 
 /// Version of the report schema.
-pub const REPORT_VERSION: u32 = 7;
+pub const REPORT_VERSION: u32 = 8;
 
 /// A whole report. The field names are a contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -58,7 +58,7 @@ pub struct Report {
     /// Confidence: number of standard deviations of the hole by which a pass or a fail must clear the target.
     pub confidence_sd: u32,
     /// Coverage extent: the part of the tunnel that the metres by verdict cover.
-    pub way: CoverageExtentReport,
+    pub coverage_extent: CoverageExtentReport,
     /// The dive as a whole.
     pub dive: DiveReport,
     /// Metres by verdict, and spacings over all sections.
@@ -68,13 +68,13 @@ pub struct Report {
     /// Runs of neighbouring flagged sections, in the order of their numbers.
     pub runs: Vec<RunReport>,
     /// Stretches that neither pass nor fail although no more samples will come, in the order of chainage.
-    pub unsure: Vec<UnsureReport>,
+    pub no_verdict: Vec<NoVerdictReport>,
     /// Stretches to pass again on the way home, from the far end to the portal.
-    pub way_home: Vec<ReturnReport>,
+    pub go_back: Vec<ReturnReport>,
     /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,
     /// Metres by verdict for the additional targets and section lengths requested.
-    pub what_if: Vec<OtherTargetReport>,
+    pub other_targets: Vec<OtherTargetReport>,
     /// Names of the heads and their alternative settings, for the report as text.
     #[serde(skip)]
     pub heads: HeadDescriptions,
@@ -290,17 +290,17 @@ impl Report {
             target_m: sections.target_m(),
             section_m: sections.section_m(),
             confidence_sd: confidence(sections.confidence_sd()),
-            way: inspected::way_report(coverage),
+            coverage_extent: inspected::way_report(coverage),
             dive: dive_report(coverage, tally, dive.sound_speeds_mps()),
             summary: summarise(sections.section_m(), of_the_way().map(|(_, section)| section)),
             sections: of_the_way()
                 .map(|(k, section)| sections::section_report(sections, k, section, dive))
                 .collect(),
             runs: runs::run_reports(dive),
-            unsure: unsure::unsure_reports(coverage),
-            way_home: runs::way_home(sections),
+            no_verdict: unsure::unsure_reports(coverage),
+            go_back: runs::go_back(sections),
             survey: survey::survey(coverage, &dive.mission().profile),
-            what_if: Vec::new(),
+            other_targets: Vec::new(),
             heads: dive.head_descriptions().clone(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
             alerts: dive.alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
@@ -314,7 +314,7 @@ impl Report {
             sources: sources::source_reports(dive),
             smoothing: None,
         };
-        let (sum_m, way_m) = (report.summary.way_m(), report.way.length_m);
+        let (sum_m, way_m) = (report.summary.way_m(), report.coverage_extent.length_m);
         debug_assert!(
             (sum_m - way_m).abs() < 1e-6,
             "metres by verdict add up to {sum_m} m, not to the coverage extent of {way_m} m"

@@ -115,7 +115,7 @@ fn head_ids(dive: &Loop) -> Vec<String> {
 }
 
 /// Stretches to pass again by the present verdicts: all open runs, from the far end to the portal.
-pub fn way_home(sections: &Sections) -> Vec<ReturnReport> {
+pub fn go_back(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());
     let mut stops: Vec<ReturnReport> = open.map(|(id, run)| stop(sections, id, run)).collect();

@@ -51,7 +51,7 @@ pub struct LineReport {
     /// Number of packets dropped before they were read, for lack of room or by the network.
     pub dropped_packets: u64,
     /// Number of messages from senders other than the device. They were not used.
-    pub strangers: u64,
+    pub ignored: u64,
     /// Final status of the connection, in plain text.
     pub status: String,
 }

@@ -7,7 +7,7 @@ use crate::resources::Coverage;
 
 /// Neighbouring sections that neither pass nor fail, for the same reason, although no more samples will come.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct UnsureReport {
+pub struct NoVerdictReport {
     /// Reason: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`,
     /// `contradicted_profile`, `other_size` or `no_wall`.
     pub why: &'static str,
@@ -16,7 +16,7 @@ pub struct UnsureReport {
     /// End, m.
     pub end_m: f64,
     /// Metres of the stretch that are unsure.
-    pub unsure_m: f64,
+    pub no_verdict_m: f64,
     /// Largest hole, m.
     pub hole_m: f64,
     /// Standard deviation of that hole, m.
@@ -26,16 +26,16 @@ pub struct UnsureReport {
     pub stretch: UnsureStretch,
 }
 
-pub(super) fn unsure_reports(coverage: &Coverage) -> Vec<UnsureReport> {
+pub(super) fn unsure_reports(coverage: &Coverage) -> Vec<NoVerdictReport> {
     let sections = &coverage.sections;
     let stretches = sections.unsure_stretches(coverage.frontier.way());
     let report = |stretch: UnsureStretch| {
         let UnsureStretch { why, from_m, to_m, metres_m, hole_m, hole_sd_m, .. } = stretch;
-        UnsureReport {
+        NoVerdictReport {
             why: why.as_str(),
             start_m: from_m,
             end_m: to_m,
-            unsure_m: metres_m,
+            no_verdict_m: metres_m,
             hole_m,
             hole_sd_m,
             stretch,

@@ -12,7 +12,7 @@ pub(crate) struct Run<'a> {
 }
 
 pub(crate) fn runs(report: &Report) -> Vec<Run<'_>> {
-    let back = |run: &RunReport| report.way_home.iter().find(|back| back.run == run.id);
+    let back = |run: &RunReport| report.go_back.iter().find(|back| back.run == run.id);
     report.runs.iter().map(|run| Run { run, back: back(run) }).collect()
 }
 
