@@ -14,7 +14,8 @@ const MEMORY: u32 = 40;
 const LEAST_AGREEING: f64 = 0.35;
 /// Standard deviations added for a lost quantity, m, m/s, radians.
 ///
-/// They belong to the position in the section, the chainage (`WAY`), the attitude, and the scale of ranges.
+/// They apply to position and velocity across the tunnel, to those along it (`LOST_WAY`), to the attitude, and to
+/// the scale of ranges.
 const LOST_M: f64 = 1.5;
 const LOST_MPS: f64 = 1.0;
 const LOST_WAY_M: f64 = 100.0;

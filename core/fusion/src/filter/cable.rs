@@ -47,7 +47,7 @@ const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
 /// Difference of the hypotheses at which the estimate is given up, m; includes the sd of the innovation.
 ///
-/// The counter must also have run by `ALIVE_M` since then, because a stuck counter is no better than the estimate.
+/// The counter must also have run by `ALIVE_M` since then, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 
@@ -398,7 +398,7 @@ mod tests {
             };
             assert!((found_s - at_s).abs() < 1e-6 && (found_m - lost_m).abs() < 1e-6, "{found_s} {found_m}");
         }
-        // A counter of a vehicle that moves too little or not at all does not end the dispute.
+        // A stationary counter does not end the dispute, whether the vehicle moves or not.
         for (share, speed_mps) in [(0.0, 0.02), (1.0, 0.0)] {
             assert_eq!(ends(share, speed_mps, 0.0), None, "{share} {speed_mps}");
         }

@@ -36,8 +36,8 @@ const PASSES_S: f64 = 20.0;
 pub struct CounterCorrections {
     /// Corrections of chainage and speed in the last second, m and m/s.
     recent: [f64; 2],
-    /// Corrections since shortly before the count stopped changing, m and m/s. The first sum includes integrated
-    /// speed.
+    /// Corrections since shortly before the count stopped changing, m and m/s. The first sum includes the
+    /// integral of the second.
     sums: [f64; 2],
     /// Standard deviations that the covariance predicts for these sums, m and m/s.
     by_chance: [f64; 2],
@@ -46,7 +46,7 @@ pub struct CounterCorrections {
     /// Standard deviations of the possible loss, m: since the count became stationary, and between passes.
     lacks_m: f64,
     lost_m: f64,
-    /// Variance of the possible permanent loss since [`Self::take_slipped_m2`] was last called, m^2.
+    /// Variance of the possible permanent loss since the last call of `take_slipped_m2`, m^2.
     slipped_m2: f64,
 }
 
