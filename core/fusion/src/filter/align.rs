@@ -290,7 +290,7 @@ mod tests {
     ///
     /// The chainage stays as uncertain as slack and scale, and the yaw stays as uncertain as the compass deviation.
     #[test]
-    fn readings_used_in_alignment_add_no_information_again() {
+    fn repeated_readings_after_alignment_add_no_information() {
         let context = Context {
             profile: shapes::ceran().unwrap(),
             site: Site::default(),

@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn stuck_or_slipping_counter_is_disputed_within_2_s() {
+    fn stuck_or_slipping_counter_is_disputed_within_4_s() {
         for (share, within_s) in [(0.0, 1.0), (0.4, 1.5), (-1.0, 0.8), (0.85, 4.0)] {
             let at_s = disputed_at(share, |_, _| {}).unwrap();
             assert!((10.1..10.0 + within_s).contains(&at_s), "{share}: {at_s}");
@@ -309,7 +309,7 @@ mod tests {
             assert!((found_s - at_s).abs() < 0.11, "{sds}: {found_s}");
         }
         assert_eq!(off(1.0, 0.01), None);
-        assert_eq!(off(3.0, 0.001), None, "too little to matter");
+        assert_eq!(off(3.0, 0.001), None, "a small innovation begins no dispute");
         let both_sides = disputed_at(1.0, |t, reading| {
             reading.off_m = if math::round_to_i64(10.0 * t) % 2 == 0 { 0.015 } else { -0.015 };
         });
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn unusual_motion_begins_a_dispute_within_the_gate() {
+    fn unusual_motion_within_the_gate_begins_a_dispute() {
         let at_s = disputed_at(1.0, |t, reading| reading.is_usual = t < 4.0).unwrap();
         assert!((at_s - 4.0).abs() < 1e-9, "{at_s}");
     }
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn dispute_reverts_the_last_second_of_a_stationary_count() {
+    fn dispute_on_a_stationary_count_reverts_the_last_second() {
         let mut cable = Cable::default();
         for k in 0..100_u32 {
             assert_eq!(cable.take(&reading(f64::from(k) / 10.0, 7.0, 0.0, 0.005)), Use::Fuse);
@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn position_sd_is_the_difference_of_counter_and_estimate() {
+    fn chainage_sd_equals_the_difference_of_counter_and_estimate() {
         let mut cable = Cable::default();
         assert_eq!(cable.take(&reading(0.0, 7.0, 0.01, 0.005)), Use::Fuse);
         assert_eq!(cable.differs_m().to_bits(), 0.0_f64.to_bits());
@@ -383,7 +383,7 @@ mod tests {
     /// The tolerance is a tenth of the distance plus a centimetre, and four tenths while the vehicle's distance is
     /// uncertain.
     #[test]
-    fn dispute_ends_as_slip_once_the_counter_runs_correctly() {
+    fn dispute_ends_as_a_slip_once_the_counter_runs_like_the_vehicle() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [
             (1.0, 0.1, 0.0, 1.0, -0.4),
             (1.0, 0.2, 0.0, 1.0, -0.4),

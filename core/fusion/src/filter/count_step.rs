@@ -136,12 +136,12 @@ mod tests {
     }
 
     #[test]
-    fn step_is_at_least_the_stated_one() {
+    fn recognised_step_is_at_least_the_stated_step() {
         for speed_mps in [0.003, 0.2] {
             let found_m = recognised_m(0.0005, 0.0005, |t| speed_mps * t + 0.02 * math::sin(0.4 * t));
             assert!((found_m - 0.0005).abs() < 1e-12, "{speed_mps}: {found_m}");
         }
-        assert!((recognised_m(0.0005, 0.02, |t| 0.2 * t) - 0.02).abs() < 1e-12, "as stated");
+        assert!((recognised_m(0.0005, 0.02, |t| 0.2 * t) - 0.02).abs() < 1e-12, "the stated step is used");
         assert!(
             (recognised_m(0.01, 0.0005, |_| 3.0) - COMMON_STEP_M).abs() < 1e-12,
             "a stationary counter has the common step"
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn one_garbled_reading_leaves_the_step() {
+    fn one_garbled_reading_does_not_change_the_step() {
         let mut step = CountStep::default();
         for k in 0..6000_u32 {
             let t = f64::from(k) / 50.0;
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_of_an_unchanged_count_or_whole_steps_share_a_rounding_error() {
+    fn unchanged_counts_and_whole_steps_share_a_rounding_error() {
         let mut step = CountStep::default();
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
         for k in 0..=20_u32 {
@@ -185,13 +185,13 @@ mod tests {
 
     /// The guess is a common step before the first movement, and then the smallest change so far.
     #[test]
-    fn step_is_guessed_until_counts_show_it() {
+    fn step_is_guessed_before_the_first_block() {
         let mut step = CountStep::default();
         for k in 0..100 {
             step.hear(at(k), 3.0, 0.0005);
         }
         assert!((step.step_m(0.0005) - COMMON_STEP_M).abs() < 1e-12);
-        assert!((step.step_m(0.05) - 0.05).abs() < 1e-12, "as stated");
+        assert!((step.step_m(0.05) - 0.05).abs() < 1e-12, "the stated step is used");
         step.hear(at(100), 3.048, 0.0005);
         assert!((step.step_m(0.0005) - 0.048).abs() < 1e-12);
         step.hear(at(101), 3.0485, 0.0005);

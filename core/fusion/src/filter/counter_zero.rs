@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn restarts_before_the_first_reading_change_nothing() {
+    fn restart_before_the_first_reading_keeps_the_zero() {
         let mut zero = CounterZero::default();
         let restart = Some(CountRestart { number: 3, was_away: false });
         for ms in 0..3 {

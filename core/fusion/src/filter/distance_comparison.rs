@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn velocity_log_off_by_a_fifth_is_named_with_the_difference() {
+    fn velocity_log_wrong_by_a_fifth_is_reported_with_the_difference() {
         let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
         let doubt = doubt.unwrap();
         // The difference is a fifth of the 12 m in a minute. It is smaller while the vehicle is slow.
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn stationary_counter_differs_from_the_log_within_seconds() {
+    fn stuck_counter_is_doubted_within_8_s() {
         let stands = |t: f64| way_m(t.min(60.0));
         let (first_s, doubt) = compared(70, stands, |t| Some(speed_mps(t)), |t| Some(way_m(t.min(60.0))));
         assert!((61.0..68.0).contains(&first_s.unwrap()), "{first_s:?}");
@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_log_is_compared_once_it_returns() {
+    fn log_that_returns_after_silence_causes_no_doubt() {
         let log_mps = |t: f64| (!(30.0..50.0).contains(&t)).then(|| speed_mps(t));
         assert_eq!(compared(120, way_m, log_mps, |t| Some(way_m(t))), (None, None));
     }

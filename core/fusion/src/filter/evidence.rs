@@ -207,7 +207,7 @@ mod tests {
 
     /// The gain of an alternative varies between blocks. The certainty of the alternative is that of its mean gain.
     #[test]
-    fn alternative_is_as_certain_as_its_blocks_agree() {
+    fn certainty_of_an_alternative_follows_the_scatter_of_its_blocks() {
         let sure_sd = |scatter_m2: f64| {
             let mut alternative = Alternative::default();
             for k in 0..8 {
@@ -230,8 +230,8 @@ mod tests {
     #[test]
     fn parameter_with_negligible_effect_is_not_certain_despite_low_scatter() {
         assert!(alike(1.0, 0.05).certain(0.03).is_some());
-        assert!(alike(0.2, 0.2).certain(0.03).is_some(), "6 mm of 3 cm");
-        assert_eq!(alike(0.1, 0.2).certain(0.03), None, "3 mm");
+        assert!(alike(0.2, 0.2).certain(0.03).is_some(), "ranges change by 6 mm, noise 3 cm");
+        assert_eq!(alike(0.1, 0.2).certain(0.03), None, "ranges change by 3 mm");
         assert_eq!(alike(0.001, 1e9).certain(0.03), None, "a rotated head in a round pipe");
         assert_eq!(alike(1.0, 0.02).certain(0.03), None, "below the reporting limit");
     }

@@ -177,7 +177,7 @@ mod tests {
     /// If the wall differs from its design, neighbouring ranges have about equal errors, so their differences show
     /// nothing.
     #[test]
-    fn wall_of_another_shape_is_not_smooth() {
+    fn wall_that_differs_in_shape_is_not_smooth() {
         near(level(2000, |_| 1.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |_| 3.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |k| math::sin(f64::from(k) / 40.0), true).smoothness().unwrap(), 0.5);
@@ -185,7 +185,7 @@ mod tests {
 
     /// Rejected innovations show that the wall differs from its design. One stray echo in twenty changes little.
     #[test]
-    fn rejected_innovations_count_a_little() {
+    fn rejected_innovations_have_limited_weight() {
         near(level(2000, |_| 9.0, false).share(), 1.0);
         let mut one = level(1000, alternating(0.5), true);
         for k in 0..200 {

@@ -143,7 +143,7 @@ mod tests {
     /// The roughness is found although the vehicle sways. A smooth wall is recognised even if it is declared as
     /// rough.
     #[test]
-    fn roughness_is_the_excess_of_the_range_sum_over_its_noise() {
+    fn roughness_equals_the_excess_variation_of_the_range_sum() {
         for rough_m in [0.0, 0.01, 0.03, 0.05] {
             for white_m in [0.0, 0.02] {
                 let found_m = found_m(rough_m, white_m, 0.0, 400.0);
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn looks_at_a_bump_are_the_pings_along_its_length() {
+    fn pings_per_bump_follow_from_speed_and_bump_length() {
         let looks = |apart_s: f64, speed_mps: f64| looks(DurNs::from_secs_f64(apart_s), speed_mps, 0.1);
         assert!((looks(0.1, 0.2) - 5.0).abs() < 1e-9);
         assert!((looks(0.1, -0.2) - 5.0).abs() < 1e-9 && (looks(-0.1, 0.2) - 5.0).abs() < 1e-9);

@@ -371,7 +371,7 @@ mod tests {
     ///
     /// For the model, three standard deviations of its rate are compared with this.
     #[test]
-    fn lively_cable_is_faster_and_reaches_farther_than_declared() {
+    fn lively_cable_gets_larger_and_faster_slack_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
             let omega = math::TAU / period_s;
             let (level, _) = level_after(|t| amplitude_m * math::sin(omega * t));
@@ -401,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn comparison_needs_inertial_data() {
+    fn readings_without_inertial_data_count_as_usual() {
         let (mut level, _) = level_after(|_| 0.0);
         level.begin(MonoNs(127_000_000_000));
         level.go_on(

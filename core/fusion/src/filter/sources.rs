@@ -211,7 +211,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn consistency_counts_used_and_gated_and_averages_used() {
+    fn mean_nis_covers_used_measurements_only() {
         let mut consistency = Consistency::default();
         assert_eq!(consistency.nis(), None);
         for nis in [0.5, 9.0, 2.5, 16.0, 100.0] {

@@ -198,9 +198,9 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_on_deck_is_at_rest_and_floating_one_is_not() {
+    fn vehicle_on_deck_is_at_rest_and_floating_vehicle_is_not() {
         assert!(still(|_| 0.003, |_| Some(0.0)), "biases and noise are no motion");
-        assert!(!still(|t| 0.01 * math::sin(t / 2.0), |_| Some(0.0)), "it turns to and fro");
+        assert!(!still(|t| 0.01 * math::sin(t / 2.0), |_| Some(0.0)), "the vehicle turns to and fro");
         assert!(!still(|_| 0.0, |t| Some(0.05 * t)), "the cable runs");
         assert!(!still(|_| 0.0, |t| (t < 5.0).then_some(0.0)), "the counter fell silent");
         assert!(
@@ -214,7 +214,7 @@ mod tests {
     ///
     /// The vehicle is at rest once the cable has been stationary for twice the time between the last pulls.
     #[test]
-    fn cable_wound_in_by_pulls_is_not_at_rest() {
+    fn vehicle_on_a_cable_wound_in_by_pulls_is_not_at_rest() {
         let pulled = |speed_mps: f64, t: f64| 0.5 * math::floor_to_i64(2.0 * speed_mps * t) as f64;
         let mut stillness = RestDetector::default();
         let mut rested_s = 0_u32;
@@ -260,13 +260,13 @@ mod tests {
     fn floating_vehicle_is_not_asked_to_stand_still_again() {
         let sways = |t: f64| 0.01 * math::sin(t / 2.0);
         let set_off = |t: f64| (t - 40.0).max(0.0) * 0.1;
-        assert_eq!(lacking_s(|_| 0.0, |_| 0.0, 35), 0, "it has stood still");
-        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "it has only moved on");
-        assert_eq!(lacking_s(sways, |_| 0.0, 10), 30, "it may yet come to rest");
-        assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "it is floating");
-        assert_eq!(lacking_s(sways, set_off, 55), 0, "it was floating before");
+        assert_eq!(lacking_s(|_| 0.0, |_| 0.0, 35), 0, "the vehicle has stood still long enough");
+        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "the vehicle has never stood still");
+        assert_eq!(lacking_s(sways, |_| 0.0, 10), 30, "the vehicle may still come to rest");
+        assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "the vehicle is floating");
+        assert_eq!(lacking_s(sways, set_off, 55), 0, "the vehicle was floating before");
         let lands = |t: f64| if t < 30.0 { sways(t) } else { 0.0 };
-        assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "it now stands still");
+        assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "the vehicle now stands still");
         // The vehicle moves slowly, and its coarse counter pauses between steps.
         assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 55), 30);
         assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 61), 0, "the dive is under way");
