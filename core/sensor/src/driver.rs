@@ -51,7 +51,7 @@ pub trait Wire {
 
     /// Writes to a device on a polled bus, waits for the time `settle`, and reads `read_bytes` bytes.
     ///
-    /// [`Driver::heard`] then receives the written bytes followed by the read ones.
+    /// [`Driver::heard`] then receives the written bytes followed by the read bytes.
     fn exchange(&mut self, write: &[u8], settle: DurNs, read_bytes: usize);
 
     /// Passes bytes on to the loop; `received` is the receive time of the first byte.

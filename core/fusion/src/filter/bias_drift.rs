@@ -42,7 +42,7 @@ impl Default for BiasDrift {
     }
 }
 
-/// Returns the largest factor for a process, which makes it as restless as that of the worst unit.
+/// Returns the largest factor for a process. It makes the process as restless as in the worst unit.
 fn most(wander: GaussMarkov, worst: f64) -> f64 {
     let density = wander.density();
     (worst * worst / density).max(1.0)

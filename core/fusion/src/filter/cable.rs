@@ -111,7 +111,7 @@ pub enum Use {
 pub struct Cable {
     /// The last reading.
     last: Option<CableReading>,
-    /// The last reading whose count differs from that of the previous reading.
+    /// The last reading that has another count than the previous reading.
     changed: Option<CableReading>,
     /// The first of the present series of readings beyond the gate.
     left: Option<CableReading>,
@@ -345,7 +345,7 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // A sum that decays over a second: 1 / (e^0.1 - 1) corrections.
+        // A sum of equal corrections that decays over a second contains 1 / (e^0.1 - 1) of them.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
@@ -361,15 +361,16 @@ mod tests {
         assert_eq!(
             cable.doubt(START + DurNs::from_secs_f64(1.0)),
             None,
-            "a dispute shorter than a second is no doubt"
+            "a dispute shorter than a second is not reported"
         );
         let doubt = cable.doubt(START + DurNs::from_secs_f64(1.2)).unwrap();
         assert!((doubt.from_m - 7.02).abs() < 1e-12 && (doubt.differs_m - 0.5).abs() < 1e-12, "{doubt:?}");
     }
 
-    /// Returns when and how the dispute of a counter that was off by -0.4 m ends, s.
+    /// Returns when the dispute of a counter that was wrong by -0.4 m ends, s, and how it ends.
     ///
-    /// The vehicle moves at `speed_mps`, the counter shows `share` of that, and `sd_m` is uncertain.
+    /// The vehicle moves at `speed_mps`, and the counter shows `share` of this motion. The innovation has the sd
+    /// `sd_m`.
     fn ends(share: f64, speed_mps: f64, sd_m: f64) -> Option<(f64, Use)> {
         let reading = |t: f64| {
             let (expected_m, shown_m) = (7.0 + speed_mps * t, 6.6 + share * speed_mps * t);
@@ -380,8 +381,9 @@ mod tests {
         times.map(|t| (t, dispute.take(&reading(t)))).find(|(_, used)| *used != Use::Withhold)
     }
 
-    /// The tolerance is a tenth of the distance plus a centimetre, and four tenths while the vehicle's distance is
-    /// uncertain.
+    /// The tolerance is a tenth of the distance plus a centimetre.
+    ///
+    /// While the vehicle's own distance is uncertain, it is four tenths of the distance plus a centimetre.
     #[test]
     fn dispute_ends_as_a_slip_once_the_counter_runs_like_the_vehicle() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [
@@ -390,7 +392,7 @@ mod tests {
             (0.95, 0.1, 0.0, 1.0, -0.405),
             (0.8, 0.1, 0.5, 1.0, -0.42),
             (1.3, 0.1, 0.5, 1.0, -0.37),
-            // Over five centimetres.
+            // At this speed, a distance of 5 cm takes longer than a second.
             (1.0, 0.03, 0.0, 1.7, -0.4),
         ] {
             let Some((found_s, Use::Slipped(found_m))) = ends(share, speed_mps, sd_m) else {

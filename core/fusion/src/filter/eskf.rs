@@ -220,7 +220,7 @@ impl Eskf {
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
             // Each reading is compared with the best estimate so far, because the first readings after a silence
-            // change the estimate by much.
+            // may change the estimate by metres.
             let known = errors;
             let later_s = to.since(waiting.at).as_secs_f64();
             let mut then = self.state_at(waiting.at);

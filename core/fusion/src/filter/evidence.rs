@@ -171,8 +171,8 @@ impl Alternative {
 
     /// Returns by how many standard deviations the alternative fits better.
     ///
-    /// `None` unless it certainly fits better and the ratio `share_left` is small. For two swapped sources, the
-    /// ratio is that of both together.
+    /// `None` unless it certainly fits better and the ratio `share_left` is small. For two swapped sources,
+    /// `share_left` covers both of them.
     pub(super) fn certain(&self, share_left: f64) -> Option<f64> {
         let [own, _, readings] = self.all;
         let n = f64::from(self.blocks);
@@ -205,7 +205,7 @@ mod tests {
         fit
     }
 
-    /// The gain of an alternative varies between blocks. The certainty of the alternative is that of its mean gain.
+    /// The gain of an alternative varies between blocks. The alternative is as certain as its mean gain.
     #[test]
     fn certainty_of_an_alternative_follows_the_scatter_of_its_blocks() {
         let sure_sd = |scatter_m2: f64| {

@@ -156,7 +156,7 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // The slope is d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
-    // The range may be as short as that of the nearest ray in the wider cone. A uniform distribution in between is
+    // The true range may be as short as the nearest ray of the wider cone. A uniform distribution in between is
     // assumed.
     let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);

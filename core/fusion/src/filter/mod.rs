@@ -245,7 +245,7 @@ impl FilterNavigation {
         }
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
-        // At first, the errors of new soundings are independent of those of earlier ones.
+        // At first, errors of new soundings are independent of errors of earlier soundings.
         self.revisit = sd.independent();
         let differs = Relative::along(self.running.cable.differs_m());
         let relative = relative.unwrap_or(self.revisit).weighted(1.0, &differs, 1.0);

@@ -73,7 +73,7 @@ impl PoseSd {
 mod tests {
     use super::*;
 
-    /// The limits are those of docs/why/navigation.md. At 4 m, a yaw of 0.25 rad moves a sample by a metre.
+    /// The limits are stated in docs/why/navigation.md. At 4 m, a yaw of 0.25 rad moves a sample by a metre.
     #[test]
     fn too_uncertain_estimate_gives_no_fix() {
         let sure = PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 };

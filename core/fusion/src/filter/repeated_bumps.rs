@@ -41,9 +41,9 @@ impl RepeatedBumps {
 
     /// Counts a return, and returns the variance with which to fuse it, m^2.
     ///
-    /// `declared_m2` is the variance of a single return, and `bumps` is the share of it that comes from bumps. All
-    /// returns from one bump together have the weight of their mean. Each return adds the part of that weight that
-    /// is new.
+    /// `declared_m2` is the variance of a single return, and `bumps` is the share of this variance that comes from
+    /// bumps. All returns from one bump together have the weight of their mean. Each return adds the part of that
+    /// weight that is new.
     pub(super) fn noise_m2(
         &mut self,
         range_m: f64,

@@ -144,8 +144,8 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Not configurable. In field dives, bumps were 0.3 m apart (docs/why/field.md), and this is two thirds
-            // of that.
+            // Not configurable: two thirds of 0.3 m, which was the distance between bumps in field dives
+            // (docs/why/field.md).
             bump_m: 0.2,
             // Not configurable. It is about the vehicle's distance during half a turn of a head.
             seen_again_m: 0.05,

@@ -38,7 +38,7 @@ pub struct Step {
     pub to: MonoNs,
     /// Estimate at the beginning.
     pub state: State,
-    /// Covariance of that estimate's errors.
+    /// Covariance of the errors of `state`.
     pub factors: Factors<ERRORS>,
     /// Change during the step.
     pub by: Move,

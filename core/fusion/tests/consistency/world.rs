@@ -95,8 +95,8 @@ pub(crate) struct Recipe {
     pub(crate) slack_is_sine: bool,
     /// Whether the vehicle file declares slack and inertial noise correctly.
     pub(crate) is_declared: bool,
-    /// Class of the inertial unit: 0 for one like on a data sheet, 1 for that of a small vehicle, 2 for a cheap
-    /// one.
+    /// Class of the inertial unit: 0 has the noise of a good data sheet, 1 is typical of a small vehicle, 2 is
+    /// cheap.
     pub(crate) imu_class: usize,
     pub(crate) motion: Motion,
     pub(crate) fault: Fault,

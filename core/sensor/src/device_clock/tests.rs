@@ -91,7 +91,7 @@ fn drift_error_agrees_with_its_standard_deviation() {
         assert_eq!((report.restarts, report.jumps), (0, 0), "seed {seed}");
         let error = (drift.ppm - ppm) / drift.sd_ppm;
         assert!(error.abs() < 5.0, "seed {seed}: {drift:?} of {ppm}");
-        // The sd itself must be small: a few ppm after a minute or two, and fractions of that later.
+        // The sd itself must be small: a few ppm after a minute or two, and a fraction of a ppm later.
         assert!(drift.sd_ppm < 300.0 / seconds, "seed {seed}, {seconds} s: {drift:?}");
         within_two += u32::from(error.abs() < 2.0);
         squares += error * error;

@@ -297,7 +297,7 @@ fn fix_at_a_past_time_has_the_position_of_that_time() {
 #[test]
 fn fix_survives_stopped_and_jumping_clocks() {
     let rig = Rig::new(rest, 2);
-    // The clock stands still for a second at a time. In the second case, it runs backwards for a tenth of a second
+    // The clock stands still for a second at a time, or in the second case runs backwards for a tenth of a second
     // at a time.
     for (stamp, back) in [(1_000_000_000_u64, false), (100_000_000, true)] {
         let mut events = rig.events(0.0, 40.0);
@@ -391,7 +391,8 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// The advice to stand still ends once the bias is known, no later than first advised, and it does not return.
+/// The advice to stand still ends once the bias is known, within the time stated at first. The advice does not
+/// return.
 #[test]
 fn stand_still_advice_ends_once_the_bias_is_known() {
     let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };

@@ -135,8 +135,8 @@ fn beam_row_on_flat_walls_equals_differences() {
     }
 }
 
-/// The expected range of a cone is that of its shortest ray. The uncertainty extends to the shortest ray of the
-/// wider cone.
+/// The expected range of a cone equals its shortest ray. The uncertainty extends to the shortest ray of the wider
+/// cone.
 #[test]
 fn cone_range_equals_that_of_its_shortest_ray() {
     // The rays lie on rings around the axis. Their minimum is too long by at most the square of half a mesh, 5e-3

@@ -1,4 +1,4 @@
-//! Verification that the process noise of an epoch equals that of the modelled random processes.
+//! Verification that the process noise of an epoch equals the noise of the modelled random processes.
 
 use super::jacobians::Draws;
 use crate::filter::factors::Factors;
