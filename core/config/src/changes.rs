@@ -1,4 +1,4 @@
-//! Overrides of values in a TOML text, as in a scene's changes to its vehicle file.
+//! Overrides of values in a TOML text, for instance the values of a vehicle file that a scene changes.
 
 use core::ops::Range;
 
@@ -8,7 +8,7 @@ use super::document::Document;
 use super::error::ConfigError;
 use super::reader::Section;
 
-/// Selects every table of an array that has the key.
+/// Word in a path that selects every table of an array.
 const ALL: &str = "all";
 /// Key that identifies a table of an array.
 const ID: &str = "id";
@@ -16,11 +16,11 @@ const ID: &str = "id";
 /// Returns `text` with the values of the keys in `changes` replaced.
 ///
 /// - `heads.layout = "x"` changes a key of a table.
-/// - `sensors.ID.key` changes a key in the array's table with this id.
-/// - `sensors.all.key` changes it in every table that has the key.
-/// - A missing array, `openings = [{ .. }]`, is added at the start.
+/// - `sensors.ID.key` changes a key of the table with this id in an array of tables.
+/// - `sensors.all.key` changes the key in every table of the array that has it.
+/// - An array that is missing from `text`, such as `openings = [{ .. }]`, is added at the start.
 ///
-/// Errors: any other key that is not in the text; a text that is not TOML.
+/// Errors: `text` is not TOML, or any other key in `changes` is missing from it.
 pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
     let table = Document::new(changes.file(), text).table()?;
     let mut changed = String::new();
@@ -49,7 +49,7 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
     Ok(changed)
 }
 
-/// Whether a value is an inline array. Tables under `[[headers]]` are not, and cannot be moved.
+/// Whether a value is an inline array. Tables under `[[headers]]` are not inline, and cannot be moved.
 fn is_array(value: &str) -> bool {
     value.starts_with('[') && !value.starts_with("[[")
 }
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_leave_all_other_bytes() {
+    fn changes_replace_only_the_named_values() {
         let expected = TEXT
             .replace("a = 1", "a = [2, 3]")
             .replace("\"phase_shift\"", "\"sector_offset\"")
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_array_is_added() {
+    fn missing_array_is_added_at_the_start() {
         let opening = "openings = [{ name = \"gate\", from_m = 1, to_m = 2 }]\n";
         let added = change(&format!("{opening}heads.layout = \"x\"\n")).unwrap();
         assert_eq!(added, format!("{opening}{}", TEXT.replace("phase_shift", "x")));

@@ -1,11 +1,12 @@
-//! A TOML text with its name: its root table, and the lines of its keys.
+//! A TOML text with its file name: parses the root table and finds the lines of keys.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::ConfigError;
 
-/// Maximum length of a text, bytes: about a hundred times a long one. Parsing takes many times its length in memory.
+/// Maximum length of a text, bytes: about a hundred times a long one. Parsing needs memory of many times this
+/// length.
 const MAX_TEXT_BYTES: usize = 1 << 20;
 
 /// A text and its file name.
@@ -16,7 +17,7 @@ pub struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Creates a document; `file` is its name in errors.
+    /// Creates a document; errors name it as `file`.
     pub fn new(file: &'a str, text: &'a str) -> Self {
         Self { file, text }
     }
@@ -50,9 +51,9 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// Returns the line of a key by its dotted path (`sensors[1].connect`), or of its table.
+    /// Returns the line of the key with this dotted path (`sensors[1].connect`).
     ///
-    /// If neither exists, it is the first line.
+    /// If the key is missing, returns the line of its table. If the table is missing too, returns the first line.
     pub fn line_of(self, path: &str) -> usize {
         if self.is_short().is_err() {
             return 1;

@@ -36,9 +36,10 @@ impl ConfigError {
 pub struct ConfigErrors(Vec<ConfigError>);
 
 impl ConfigErrors {
-    /// Sorts the errors by line, each once; `None` without any.
+    /// Sorts the errors by line and removes duplicates; `None` if there are no errors.
     pub(super) fn of(mut errors: Vec<ConfigError>) -> Option<Self> {
-        // A stable sort: errors of one line stay in the order of discovery, and errors of other files stay in place.
+        // The sort is stable: errors of one line stay in the order of discovery. Errors from several files are not
+        // sorted.
         let file = errors.first()?.file.clone();
         if errors.iter().all(|error| error.file == file) {
             errors.sort_by_key(|error| error.line);
@@ -59,7 +60,7 @@ impl ConfigErrors {
         Some(Self(each))
     }
 
-    /// Appends errors of a file that the first one refers to.
+    /// Appends the errors of a second file to which this file refers.
     #[must_use]
     pub fn and(mut self, others: Self) -> Self {
         self.0.extend(others.0);
@@ -91,11 +92,11 @@ impl fmt::Display for ConfigErrors {
 
 impl std::error::Error for ConfigErrors {}
 
-/// Maximum number of reported errors of a file. Nobody reads more, and a file of another kind may have one in each
+/// Maximum number of reported errors of a file. Nobody reads more, and a file that is not TOML may have one in each
 /// line.
 pub(super) const MOST_ERRORS: usize = 100;
 
-/// Errors of the tables of one document, if they are collected.
+/// Errors found so far in one document; `None` if reading stops at the first error.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Notes(Option<Rc<RefCell<Vec<ConfigError>>>>);
 
@@ -105,7 +106,7 @@ impl Notes {
         Self(Some(Rc::default()))
     }
 
-    /// Whether errors are collected, so that reading continues after one.
+    /// Whether errors are collected, so that reading continues after an error.
     pub(super) fn are_kept(&self) -> bool {
         self.0.is_some()
     }

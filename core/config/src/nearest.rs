@@ -1,11 +1,12 @@
-//! Search for the word that the author may have intended.
+//! Search for the known word that the author of a file may have intended.
 
-/// Maximum number of edits to an intended word: one for short words, two from six letters on.
+/// Maximum number of edits between a word and the intended one: `FEW` for short words, `MORE` from `LONG` letters
+/// on.
 const FEW: usize = 1;
 const MORE: usize = 2;
 const LONG: usize = 6;
 
-/// Returns the known word nearest to `word`, the first of several; `None` if none is near.
+/// Returns the known word nearest to `word`; `None` if none is near. Of equally near words, returns the first.
 pub(super) fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
     let near = |candidate: &&str| {
         if stem(word) == stem(candidate) {
@@ -32,9 +33,10 @@ fn stem(word: &str) -> &str {
     word.rsplit_once('_').filter(|(_, unit)| units.contains(unit)).map_or(word, |(stem, _)| stem)
 }
 
-/// Number of letters to insert, remove, replace, or swap with their neighbour, ignoring case.
+/// Number of letters to insert, remove, replace or swap with a neighbour to turn `from` into `to`, ignoring case.
 ///
-/// Source: the optimal string alignment distance; Boytsov, "Indexing methods for approximate dictionary searching", 2011.
+/// Source: the optimal string alignment distance; Boytsov, "Indexing methods for approximate dictionary searching",
+/// 2011.
 fn changes(from: &str, to: &str) -> usize {
     let letters = |word: &str| -> Vec<char> { word.chars().flat_map(char::to_lowercase).collect() };
     let (from, to) = (letters(from), letters(to));
@@ -60,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edits_are_counted() {
+    fn edit_distance_is_symmetric_and_ignores_case() {
         let cases = [
             ("", "abc", 3),
             ("plugn", "plugin", 1),
@@ -75,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn nearest_word_is_found_if_it_is_near() {
+    fn nearest_word_is_found_within_two_edits() {
         let known = ["target_m", "section_m", "id", "heads", "hull"];
         for (word, meant) in [
             ("target_cm", Some("target_m")),

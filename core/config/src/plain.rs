@@ -1,24 +1,23 @@
-//! Sanitising of external text for display, since names may contain terminal control codes.
+//! Sanitising of external text for display, because such text may contain terminal control codes.
 //!
-//! Such text comes from files, devices and command lines.
+//! External text comes from files, devices and command lines.
 
 use core::fmt::Write as _;
 use std::borrow::Cow;
 
-/// Returns a text as one visible line; JSON remains valid.
+/// Returns a text as one visible line. A JSON text remains valid JSON.
 ///
-/// Control characters (line ends and escape codes included), and characters that turn or hide others, become escapes
-/// as in JSON.
+/// Escapes as in JSON replace control characters, line ends included, and characters that reverse or hide others.
 pub fn one_line(text: &str) -> Cow<'_, str> {
     escaped(text, acts)
 }
 
-/// Returns a text of several lines, each sanitised by [`one_line`], for text with line ends of our own.
+/// Returns a text of several lines with each line sanitised as by [`one_line`]; line ends are kept.
 pub fn lines(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c != '\n' && acts(c))
 }
 
-/// Whether [`one_line`] shows a text unchanged.
+/// Whether [`one_line`] leaves a text unchanged.
 pub fn is_plain(text: &str) -> bool {
     !text.contains(acts)
 }

@@ -11,10 +11,10 @@ use super::error::{ConfigError, ConfigErrors, MOST_ERRORS, Notes};
 use super::nearest::nearest;
 use super::plain::is_plain;
 
-/// Reads a file referenced by another one (a polyline profile, a device's definitions), by its name there.
+/// Function that reads a referenced file by the name in the key, for instance a polyline profile or a DBC file.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 
-/// Maximum number of tables in an array of tables, because each is compared with the others.
+/// Maximum number of tables in an array. It is limited because each table is compared with all others.
 const MOST_TABLES: usize = 2000;
 
 /// A file referenced by a key.
@@ -36,10 +36,10 @@ impl core::fmt::Debug for Files<'_> {
     }
 }
 
-/// A value's path, its text, and a constructor for errors about it.
+/// Path of a value, text of the value, and a constructor for errors about it.
 pub(super) type Leaf<'s> = (Vec<String>, &'s str, Box<dyn Fn(&str) -> ConfigError + 's>);
 
-/// One table of a document. Keys that were never read are an error at [`Section::finish`].
+/// One table of a document. [`Section::finish`] reports keys that were never read.
 #[derive(Debug)]
 pub struct Section<'a> {
     document: Document<'a>,
@@ -52,7 +52,7 @@ pub struct Section<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Parses the text to its root table, whose readers fail at the first error.
+    /// Parses the text and returns its root table, whose methods fail at the first error.
     ///
     /// Errors: the text is not TOML.
     pub fn root(self) -> Result<Section<'a>, ConfigError> {
@@ -61,8 +61,8 @@ impl<'a> Document<'a> {
 
     /// Reads the whole text with `read`, and finds all of its errors.
     ///
-    /// An error in the table or below is noted, and reading continues as if the key were absent. Unread keys are
-    /// errors, too.
+    /// The table and its subtables note each error, and reading continues as if the key were absent. Unread keys
+    /// are also errors.
     ///
     /// Errors: all noted errors, and the one that `read` returned.
     pub fn read<T>(
@@ -71,7 +71,7 @@ impl<'a> Document<'a> {
     ) -> Result<T, ConfigErrors> {
         self.is_short()?;
         let (table, broken) = DeTable::parse_recoverable(self.text);
-        // Only the first error of a line counts, since the others follow from it.
+        // Only the first syntax error of a line is reported, because the others follow from it.
         let told = broken.iter().take(2 * MOST_ERRORS);
         let mut broken: Vec<ConfigError> = told.map(|error| self.broken(error)).collect();
         broken.dedup_by_key(|error| error.line);
@@ -94,25 +94,26 @@ impl<'a> Document<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// A document's root table.
+    /// Creates the root table of a document.
     fn of_root(document: Document<'a>, table: DeTable<'a>, notes: Notes) -> Self {
         let (path, asked) = (String::new(), RefCell::default());
         Self { document, path, at: 0, table, asked, files: Files(None), notes }
     }
 
-    /// Lets keys of this table and its subtables refer to files, which `load` reads.
+    /// Allows keys of this table and its subtables to refer to files; `load` reads the files.
     #[must_use]
     pub fn with_files(self, load: Loader<'a>) -> Self {
         Self { files: Files(Some(load)), ..self }
     }
 
-    /// Returns the file referenced by a key. Files referenced by a vehicle file are also attached to logs.
+    /// Returns the name and text of the file referenced by a key. Logs contain the files referenced by a vehicle
+    /// file.
     ///
-    /// Errors: not a string, or a file that cannot be read.
+    /// Errors: the value is not a string, or the file cannot be read.
     pub fn named_file(&self, key: &'static str) -> Result<Option<NamedFile>, ConfigError> {
         let Some(name) = self.text(key)? else { return Ok(None) };
         let Files(load) = self.files;
-        let load = load.ok_or_else(|| self.invalid(key, "names a file, and files can't be read here"))?;
+        let load = load.ok_or_else(|| self.invalid(key, "names a file, but no file can be read here"))?;
         match load(&name) {
             Ok(text) => Ok(Some(NamedFile { name, text })),
             Err(problem) => self.wrong(key, self.table.get(key), problem),
@@ -121,7 +122,7 @@ impl<'a> Section<'a> {
 
     /// Reads a number within `allowed`, in the unit of the key's suffix.
     ///
-    /// Errors: not a finite number, or outside `allowed`.
+    /// Errors: the value is not a finite number or is outside `allowed`.
     pub fn number(
         &self,
         key: &'static str,
@@ -135,9 +136,9 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads a whole number within `allowed`; hexadecimal (0x...) is accepted, too.
+    /// Reads a whole number within `allowed`. Hexadecimal (0x...) is also accepted.
     ///
-    /// Errors: not a whole number, or outside `allowed`.
+    /// Errors: the value is not a whole number or is outside `allowed`.
     pub fn integer(
         &self,
         key: &'static str,
@@ -153,7 +154,7 @@ impl<'a> Section<'a> {
 
     /// Reads a string.
     ///
-    /// Errors: not a string.
+    /// Errors: the value is not a string, or contains control characters.
     pub fn text(&self, key: &'static str) -> Result<Option<String>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         match value.get_ref().as_str() {
@@ -163,9 +164,9 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads true or false.
+    /// Reads a boolean.
     ///
-    /// Errors: anything else.
+    /// Errors: the value is neither true nor false.
     pub fn boolean(&self, key: &'static str) -> Result<Option<bool>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         match value.get_ref().as_bool() {
@@ -174,9 +175,9 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads one of the given words; returns its associated value.
+    /// Reads one of the given words and returns the value associated with it.
     ///
-    /// Errors: another word; the message lists those allowed.
+    /// Errors: the value is none of these words; the message lists them.
     pub fn choice<T: Copy>(&self, key: &'static str, among: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         let found = value.get_ref().as_str().and_then(|text| among.iter().find(|(word, _)| *word == text));
@@ -191,7 +192,7 @@ impl<'a> Section<'a> {
 
     /// Reads three numbers, each within `allowed`.
     ///
-    /// Errors: not an array of three, or one of them outside.
+    /// Errors: the value is not an array of three numbers, or a number is outside `allowed`.
     pub fn triple(
         &self,
         key: &'static str,
@@ -208,7 +209,7 @@ impl<'a> Section<'a> {
 
     /// Reads an array of numbers of any length, each within `allowed`.
     ///
-    /// Errors: not an array of numbers, or one of them outside.
+    /// Errors: the value is not an array of numbers, or a number is outside `allowed`.
     pub fn numbers(
         &self,
         key: &'static str,
@@ -223,9 +224,10 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads a number or an array of numbers, each within `allowed`; `wanted` describes them in errors.
+    /// Reads a number or an array of numbers, each within `allowed`; `wanted` describes the allowed values in
+    /// errors.
     ///
-    /// Errors: anything else, or one of them outside.
+    /// Errors: the value is neither, or a number is outside `allowed`.
     pub fn number_or_numbers(
         &self,
         key: &'static str,
@@ -240,9 +242,9 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads a table within this one.
+    /// Reads a subtable of this table.
     ///
-    /// Errors: the key holds something else.
+    /// Errors: the value is not a table.
     pub fn section(&self, key: &'static str) -> Result<Option<Section<'a>>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         match value.get_ref() {
@@ -251,9 +253,9 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads the tables of an array of tables; empty if the key is absent.
+    /// Reads the tables of an array of tables; returns none if the key is absent.
     ///
-    /// Errors: the key holds something else.
+    /// Errors: the value is not an array of tables, or it has too many tables.
     pub fn sections(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(Vec::new()) };
         let table = |(i, item): (usize, &Spanned<DeValue<'a>>)| match item.get_ref() {
@@ -275,9 +277,9 @@ impl<'a> Section<'a> {
         Ok(self.wrong(key, Some(value), problem)?.unwrap_or_default())
     }
 
-    /// Reads one table, or the tables of an array of tables; empty if the key is absent.
+    /// Reads one table or an array of tables; returns no tables if the key is absent.
     ///
-    /// Errors: the key holds something else.
+    /// Errors: the value is neither, or it has too many tables.
     pub fn tables(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
         let one = self.ask(key).is_some_and(|value| matches!(value.get_ref(), DeValue::Table(_)));
         if one { Ok(self.section(key)?.into_iter().collect()) } else { self.sections(key) }
@@ -285,7 +287,7 @@ impl<'a> Section<'a> {
 
     /// Reads an array of strings.
     ///
-    /// Errors: the key holds something else.
+    /// Errors: the value is not an array of strings.
     pub fn texts(&self, key: &'static str) -> Result<Option<Vec<String>>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         let text = |item: &Spanned<DeValue<'a>>| item.get_ref().as_str().map(str::to_owned);
@@ -295,7 +297,8 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Returns `value`, or an error that the key is missing; the error names a similar key if there is one.
+    /// Returns `value`, or an error that the key is missing; the error names an unread key with a similar name, if
+    /// any.
     ///
     /// Errors: `value` is `None`.
     pub fn required<T>(&self, key: &'static str, value: Option<T>) -> Result<T, ConfigError> {
@@ -307,7 +310,7 @@ impl<'a> Section<'a> {
         let is_below = |error: &ConfigError| {
             error.key.strip_prefix(&name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
         };
-        // The key is present, and its value is wrong.
+        // The key is present with a wrong value, so the noted error about it is returned.
         if let Some(wrong) = self.noted(|error| self.table.contains_key(key) && is_below(error)) {
             return wrong;
         }
@@ -315,7 +318,7 @@ impl<'a> Section<'a> {
         misnamed.unwrap_or_else(|| self.told(self.error(key, None, "is missing".to_owned())))
     }
 
-    /// Returns an error about an unread key of this table with a name similar to `key`, if there is one.
+    /// Returns an error about an unread key of this table whose name is similar to `key`, if there is one.
     fn misnamed(&self, key: &str) -> Option<ConfigError> {
         let asked = self.asked.borrow();
         let mut others: Vec<_> =
@@ -326,16 +329,16 @@ impl<'a> Section<'a> {
         Some(self.told(self.unknown(other, &[key])))
     }
 
-    /// Reads a part of the file; `None` if the part has errors, which are noted so that reading continues.
+    /// Reads a part of the file; `None` if the part has errors. They are noted, so that reading continues.
     ///
-    /// Errors: that of the part, if errors are not collected.
+    /// Errors: the error of the part, if errors are not collected.
     pub fn part<T>(&self, read: impl FnOnce() -> Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
         let before = self.notes.count();
         let part = self.go_on(read())?;
         Ok(part.filter(|_| self.notes.count() == before))
     }
 
-    /// Returns the result, or notes its error.
+    /// Returns the result. If it is an error and errors are collected, notes the error and returns `None`.
     fn go_on<T>(&self, result: Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
         match result {
             Ok(result) => Ok(Some(result)),
@@ -349,7 +352,7 @@ impl<'a> Section<'a> {
 
     /// Checks that every key of this table was read.
     ///
-    /// Errors: the first unread key; the message names the nearest known key, or lists the known ones.
+    /// Errors: a key was not read; the message names the nearest known key, or lists the known keys.
     pub fn finish(&self) -> Result<(), ConfigError> {
         let asked = self.asked.borrow();
         let mut unknown: Vec<_> =
@@ -360,7 +363,7 @@ impl<'a> Section<'a> {
                 break;
             }
             let name = self.full(key.get_ref());
-            // A key found near a missing one has already been reported.
+            // An error about this key may already be noted, because its name is similar to a missing one.
             if self.noted(|error| error.key == name).is_none() {
                 self.go_on::<()>(Err(self.unknown(key, &asked)))?;
             }
@@ -384,9 +387,9 @@ impl<'a> Section<'a> {
 
     /// Returns an error about `key` in this table, for checks that only the caller can make.
     ///
-    /// If an error of the key has already been noted, it returns that one, since this error may only follow from it.
-    /// The same holds if the key is absent from a table below the root that has an error. For an absent key, it names
-    /// a similar key if there is one.
+    /// The new error may only follow from an earlier one. So it returns a noted error of the same key instead, if
+    /// there is one. If the key is absent from a table below the root, it returns a noted error of that table, or
+    /// an error about a key with a similar name.
     pub fn invalid(&self, key: &str, problem: &str) -> ConfigError {
         let (name, value) = (self.full(key), self.table.get(key));
         let is_below = value.is_none() && !self.path.is_empty();
@@ -395,7 +398,8 @@ impl<'a> Section<'a> {
         follows.or_else(misnamed).unwrap_or_else(|| self.told(self.error(key, value, problem.to_owned())))
     }
 
-    /// Returns an error about this table as a whole, or a noted error of one of its keys.
+    /// Returns an error about this table as a whole; if an error of one of its keys is noted, returns that one
+    /// instead.
     pub fn invalid_itself(&self, problem: &str) -> ConfigError {
         let error = || ConfigError {
             file: self.document.file.to_owned(),
@@ -422,13 +426,14 @@ impl<'a> Section<'a> {
         self.notes.find(|error| error.file == self.document.file && is_so(error))
     }
 
-    /// Notes an error that goes to the caller.
+    /// Notes an error and returns it to the caller.
     fn told(&self, error: ConfigError) -> ConfigError {
         self.notes.add(&error);
         error
     }
 
-    /// Notes a wrong value, and treats it as absent.
+    /// Notes an error about a wrong value and returns `None`, as for an absent key. If errors are not collected,
+    /// fails.
     fn wrong<T>(
         &self,
         key: &str,
@@ -450,7 +455,7 @@ impl<'a> Section<'a> {
         keys.into_iter().map(|key| key.get_ref().as_ref()).collect()
     }
 
-    /// All values below this table that aren't tables: path from here, text, and error constructor.
+    /// Returns all values in this table and its subtables, each with its path, its text and an error constructor.
     pub(super) fn leaves(&self) -> Vec<Leaf<'_>> {
         let mut leaves = Vec::new();
         self.collect_leaves(&self.table, &[], &mut leaves);

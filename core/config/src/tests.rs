@@ -20,7 +20,7 @@ fn error_names_file_line_key_value_and_allowed_values() {
 }
 
 #[test]
-fn missing_key_and_invalid_toml_have_their_line() {
+fn errors_about_a_missing_key_and_invalid_toml_name_the_line() {
     let root = Document::new("v.toml", "\n[water]\n").root().unwrap();
     let water = root.section("water").unwrap().unwrap();
     let error =
@@ -30,7 +30,7 @@ fn missing_key_and_invalid_toml_have_their_line() {
 }
 
 #[test]
-fn key_refers_to_a_file() {
+fn file_referenced_by_a_key_is_read() {
     let files = |name: &str| match name {
         "a.dbc" => Ok("text".to_owned()),
         _ => Err("isn't there".to_owned()),
@@ -38,7 +38,7 @@ fn key_refers_to_a_file() {
     let text = "file = \"a.dbc\"\n[inner]\nfile = \"a.dbc\"\nother = \"b.dbc\"\n";
     let root = Document::new("v.toml", text).root().unwrap();
     let error = root.named_file("file").unwrap_err().to_string();
-    assert_eq!(error, "v.toml:1: file = \"a.dbc\": names a file, and files can't be read here");
+    assert_eq!(error, "v.toml:1: file = \"a.dbc\": names a file, but no file can be read here");
     let root = root.with_files(&files);
     let expected = NamedFile { name: "a.dbc".to_owned(), text: "text".to_owned() };
     let inner = root.section("inner").unwrap().unwrap();
@@ -93,7 +93,7 @@ fn all_errors_are_found_in_one_pass() {
 }
 
 #[test]
-fn valid_text_is_read() {
+fn valid_text_is_read_and_unread_key_is_rejected() {
     let read = Document::new("v.toml", "a = 1\n").read(|root| root.number("a", 0.0..=1.0));
     assert_eq!(read, Ok(Some(1.0)));
     let unread = Document::new("v.toml", "a = 1\nb = 2\n").read(|root| root.number("a", 0.0..=1.0));
@@ -111,7 +111,7 @@ fn similar_word_is_suggested() {
 }
 
 #[test]
-fn all_invalid_toml_is_found() {
+fn every_line_of_invalid_toml_is_reported() {
     let errors = Document::new("v.toml", "a = = 1\nb = 2\nc = \"x\n[d\n").read(|_| Ok(())).unwrap_err();
     let lines: Vec<usize> = errors.errors().iter().map(|error| error.line).collect();
     assert_eq!(lines, [1, 3, 4], "{errors}");

@@ -1,23 +1,23 @@
-//! Detection of a sonar that reports one range in every direction: its last echo, or its own frame.
+//! Detection of a sonar that reports the same range in every direction: its last echo, or an echo of its own frame.
 
 use serde::{Deserialize, Serialize};
 
-/// Ranges within this count as equal, m.
+/// Ranges that differ by less than this count as equal, m.
 ///
-/// It is finer than a profiling sonar's resolution, so that noise alone separates the ranges of a wall.
+/// The limit is finer than a profiling sonar's resolution, so that noise alone separates the ranges of a wall.
 const SAME_M: f64 = 0.002;
 
-/// A run of returns with one range, and the spread of the design ranges along it.
+/// A run of returns with the same range, and the spread of the design range along the run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ConstantRange {
     returns: u32,
     range_m: f64,
-    /// Minimum and maximum of range less design range, m.
+    /// Minimum and maximum of the range less the design range, m.
     off_m: [f64; 2],
 }
 
 impl ConstantRange {
-    /// Adds a return: its range, and its excess over the design range, m.
+    /// Adds a return: its range, and the excess of the range over the design range, m.
     pub fn note(&mut self, range_m: f64, off_m: f64) {
         if self.returns == 0 || (range_m - self.range_m).abs() > SAME_M {
             *self = Self { returns: 1, range_m, off_m: [off_m; 2] };
@@ -28,19 +28,19 @@ impl ConstantRange {
         }
     }
 
-    /// Whether at least `fewest` returns have one range while the design range varies by `varies_m`.
+    /// Whether at least `fewest` returns have the same range while the design range varies by more than `varies_m`.
     ///
-    /// No real wall keeps a constant range to within 2 mm where its design does not.
+    /// A real wall whose design range varies never keeps its range constant to within 2 mm.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }
 
-    /// Whether there has been a return.
+    /// Whether there has been any return.
     pub fn is_heard(&self) -> bool {
         self.returns > 0
     }
 
-    /// Whether the last return was the first with its range.
+    /// Whether the last return began a new run.
     pub fn is_new(&self) -> bool {
         self.returns == 1
     }
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn constant_range_along_a_receding_wall_is_stuck_until_it_changes() {
+    fn constant_range_at_a_receding_wall_counts_as_stuck() {
         let wall_m = |k: u32| 5.0 + 0.02 * f64::from(k);
         let mut stuck = after((0..8).map(|k| (5.0, wall_m(k))));
         assert!(stuck.is_stuck(8, 0.1) && !stuck.is_stuck(9, 0.1) && !stuck.is_stuck(8, 0.2));
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn round_wall_and_followed_wall_are_not_stuck() {
+    fn constant_design_range_and_changing_range_are_not_stuck() {
         assert!(!after((0..1000).map(|_| (1.0, 1.0))).is_stuck(8, 0.05));
         assert!(!after((0..1000).map(|k| (1.0 + 0.003 * f64::from(k), 1.0))).is_stuck(2, 0.05));
     }

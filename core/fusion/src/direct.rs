@@ -1,8 +1,8 @@
 //! Navigation without a filter, after §9.2 of the paper; the baseline for the filter.
 //!
-//! Attitude comes from the IMU and chainage from the tether. The position in the cross-section comes from fitting the
-//! echosounders' ranges to the design profile. Height comes from depth while the echosounders are silent. It suits
-//! low-noise data.
+//! Attitude comes from the IMU and chainage from the tether. The position in the cross-section is the best fit of
+//! the echosounders' ranges to the design profile. While the echosounders are silent, height comes from the depth
+//! sensor. The method suits data with low noise.
 
 use super::relative::Relative;
 use super::section::{Echo, settle};
@@ -21,7 +21,7 @@ use headrace_sensor::reading::{EchoRange, Level, Reading, TetherLength};
 const ECHO_AGE: DurNs = DurNs(500_000_000);
 /// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
-/// Window of tether readings for the speed, and the maximum number of readings in it.
+/// Time window of tether readings from which the speed is computed, and the maximum number of these readings.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
 /// Standard deviation of an echo's range, m.
@@ -37,7 +37,7 @@ pub struct DirectNavigation {
     tether: TetherTrack,
     echoes: [Option<(MonoNs, Echo)>; MAX_SOURCES],
     place: Option<(MonoNs, [f64; 2])>,
-    /// Height by pressure, and its offset relative to the echoes, m.
+    /// Height from pressure, and the offset that makes it agree with the echoes, m.
     height_m: Option<f64>,
     height_offset_m: f64,
 }
@@ -50,14 +50,14 @@ struct TetherTrack {
     readings: [(MonoNs, f64); SPEED_READINGS],
     count: usize,
     resolution_m: f64,
-    /// Number of the counter's last restart before the first reading.
+    /// Number of restarts of the counter before its first reading here.
     restarts: u32,
 }
 
 stateful!(TetherTrack { state: count, resolution_m, restarts; slots: readings; });
 
 impl DirectNavigation {
-    /// Creates it without readings.
+    /// Creates the navigation, without readings.
     pub fn new(profile: Profile, site: Site) -> Self {
         Self {
             profile,
@@ -90,7 +90,7 @@ impl DirectNavigation {
         self.find_place(at);
     }
 
-    /// Updates the position in the section to the best fit of the recent ranges to the profile.
+    /// Updates the position in the section to the best fit of recent ranges to the profile.
     fn find_place(&mut self, now: MonoNs) {
         let Some((_, attitude)) = self.attitude else { return };
         let [reference_y, reference_z] = self.profile.reference();
@@ -124,7 +124,7 @@ impl TetherTrack {
         if self.count == 0 {
             self.restarts = restarts;
         }
-        // After a restart the count begins again at zero, and this method cannot restore the chainage.
+        // After a restart, the count begins at zero again. This method has no means to restore the chainage.
         if restarts != self.restarts {
             return;
         }
@@ -184,7 +184,7 @@ impl Navigation for DirectNavigation {
         let (_, [y_m, z_m]) = self.place.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Section)?;
         let speed_mps = self.tether.speed_mps();
         let x_m = chainage_m + speed_mps * at.since(since).as_secs_f64();
-        // The difference contains two independent roundings to the counter's quantum.
+        // The error is the rounding of two readings to the counter's quantum.
         let relative = Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0));
         Ok(Fix {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },
@@ -257,7 +257,7 @@ mod tests {
         let off = fix.pose.position - truth.position;
         assert!(off.norm() < 2e-3, "{:?}", fix.pose);
         assert!((fix.speed_mps - 0.2).abs() < 1e-12);
-        // Between readings of the cable the chainage is extrapolated.
+        // Between cable readings, the chainage is extrapolated.
         let later = nav.fix(now + headrace_geometry::time::DurNs::from_millis(100)).unwrap();
         assert!((later.pose.position.x() - fix.pose.position.x() - 0.02).abs() < 1e-9, "{:?}", later.pose);
         assert_eq!(nav.fix(MonoNs(3_000_000_000)), Err(NoFix::Heading));
@@ -281,7 +281,7 @@ mod tests {
             })
         };
         let depth = SensorInfo { kind: SensorKind::Depth, ..imu };
-        // The sensor is off by 0.4 m; the echoes measure 3.0 m.
+        // The depth sensor shows 0.4 m too much height: 3.4 m, where the echoes measure 3.0 m.
         nav.update(1, &depth, at_once(MonoNs(0)), &pressure(3.4));
         let down = SensorInfo {
             mount: Mount {

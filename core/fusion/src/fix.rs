@@ -1,4 +1,4 @@
-//! Navigation fix, the missing part if there is none, and the timestamps of a reading.
+//! Navigation fix, the part that is missing if there is no fix, and the timestamps of a reading.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,19 +13,20 @@ pub struct Fix {
     pub pose: Pose,
     /// Speed along the tunnel, m/s, positive inwards.
     pub speed_mps: f64,
-    /// Error covariance relative to the previous pass of the heads over this place.
+    /// Error covariance relative to the previous pass of the heads over this position.
     pub relative: Relative,
-    /// Error covariance relative to a much earlier visit to this place in the same stretch of navigation.
+    /// Error covariance relative to a much earlier visit to this position in the same stretch of navigation.
     pub revisit: Relative,
-    /// Number of the stretch of navigation. The relative error between positions of different stretches is unknown.
+    /// Number of the stretch of navigation. Between two stretches, the relative position error is unknown.
     pub tie: u32,
     /// Number of times the estimate has become much more certain while it settled.
     ///
-    /// Soundings from before such a change carry the larger errors of that time, which `relative` does not include.
+    /// Earlier soundings carry the larger errors from before such a change. `relative` does not include those
+    /// errors.
     pub settled: u32,
 }
 
-/// Missing part of a fix.
+/// Part of a fix that is missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NoFix {
     /// No recent attitude.
@@ -40,7 +41,7 @@ impl NoFix {
     /// All variants.
     pub const ALL: [Self; 3] = [Self::Heading, Self::Chainage, Self::Section];
 
-    /// The word for it in reports and logs.
+    /// Name of the missing part in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Heading => "no_heading",
@@ -53,7 +54,7 @@ impl NoFix {
 /// Receive time and time of validity of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Times {
-    /// Receive time of its first byte.
+    /// Receive time of the first byte.
     pub received: MonoNs,
     /// Time of validity.
     pub valid: MonoNs,

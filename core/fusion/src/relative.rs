@@ -7,22 +7,22 @@ use headrace_geometry::math;
 
 /// Relative covariance of the errors that move a sample along the tunnel: chainage, pitch and yaw.
 ///
-/// It is the covariance of the difference between the errors at two times.
+/// The relative error is the difference between the errors at two times.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Relative([[f64; 3]; 3]);
 
 impl Relative {
-    /// Creates it from the covariance of chainage, m, pitch and yaw, radians.
+    /// Creates the relative covariance from a matrix in the order chainage, m, pitch and yaw, radians.
     pub fn new(covariance: [[f64; 3]; 3]) -> Self {
         Self(covariance)
     }
 
-    /// Creates the covariance of a pure chainage error with this standard deviation, m.
+    /// Creates the relative covariance of a pure chainage error with this standard deviation, m.
     pub fn along(sd_m: f64) -> Self {
         Self([[sd_m * sd_m, 0.0, 0.0], [0.0; 3], [0.0; 3]])
     }
 
-    /// Standard deviation of the chainage of a point at `arm` from the vehicle, m.
+    /// Standard deviation of the relative chainage error of a point at `arm` from the vehicle, m.
     pub fn sd_m(&self, arm: Vec3<Tunnel>) -> f64 {
         let weights = [1.0, arm.z(), -arm.y()];
         let rows = self.0.iter().zip(weights);
@@ -33,13 +33,13 @@ impl Relative {
 
     /// Standard deviation of pitch and yaw together, radians.
     ///
-    /// It bounds the change of [`Relative::sd_m`] per metre of the arm.
+    /// Per metre of the arm, [`Relative::sd_m`] changes by at most this much.
     pub fn turn_sd_rad(&self) -> f64 {
         let [_, [_, pitch, _], [.., yaw]] = self.0;
         math::sqrt((pitch + yaw).max(0.0))
     }
 
-    /// Returns the covariance for another reference point of the vehicle, at `arm` from this one.
+    /// Returns the covariance for a reference point on the vehicle at `arm` from the present one.
     #[must_use]
     pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
         let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moving_the_reference_point_keeps_the_sd_of_a_place() {
+    fn reference_point_does_not_change_the_sd_of_a_sample() {
         let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
         let (whole, part) = (Vec3::new(0.3, 2.0, -1.5), Vec3::new(-0.1, 0.4, 0.7));
         let moved = relative.moved(part).sd_m(whole + -part);
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn sd_grows_per_metre_of_arm_by_at_most_the_turn_sd() {
+    fn sd_grows_by_at_most_turn_sd_per_metre_of_arm() {
         let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
         let arm = |k: u32| Vec3::new(0.0, math::sin(f64::from(k)), math::cos(f64::from(k)));
         let adds_m = |k: u32| relative.sd_m(arm(k).scaled(51.0)) - relative.sd_m(arm(k).scaled(50.0));

@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::tunnel::Profile;
 
-/// Minimum cosine of the angle of incidence; beams that graze the wall more are ignored.
+/// Minimum cosine of the angle of incidence. Beams at a more grazing angle are ignored.
 const LEAST_COSINE: f64 = 0.1;
-/// Minimum change of range with height, m/m, for a beam to count as determining the height.
+/// Minimum change of range with height, m/m. A beam with a larger change determines the height.
 const STEEP: f64 = 0.7;
 const ROUNDS: usize = 3;
 
-/// A range to the wall along the sensor's x axis.
+/// A range to the wall, measured along the sensor's x axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Echo {
     /// Mount of the sonar.
@@ -20,19 +20,20 @@ pub struct Echo {
     pub range_m: f64,
 }
 
-/// A position in the cross-section, and whether the echoes determine its height.
+/// A position in the cross-section, with a note whether its height is determined by echoes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// y and z, m.
     pub at_m: [f64; 2],
-    /// Whether the echoes determine its height.
+    /// Whether an echo determines the height.
     pub is_height_seen: bool,
 }
 
-/// Fits the position to the echoes by Gauss-Newton, starting at `start`.
+/// Fits the position to the echoes by Gauss-Newton iteration, starting at `start`.
 ///
-/// Minimises sum((measured - predicted)^2 / sd^2) plus a prior (position and standard deviations, m). The derivative
-/// d range / d position is -n / (n . beam). Stops before a step that would leave the cross-section.
+/// Minimises sum((measured - predicted)^2 / sd^2) plus a prior term (position and standard deviations, m). The
+/// derivative of a range with respect to the position is -n / (n . beam). Stops before a step that would leave the
+/// cross-section.
 pub fn settle(
     profile: &Profile,
     attitude: Rot<Tunnel, Body>,

@@ -1,7 +1,7 @@
-//! Detection of a stuck inertial unit: a device that hangs repeats its last reading.
+//! Detection of a stuck inertial unit, which repeats its last reading.
 //!
-//! A reading with noise hardly ever equals the one before to the last bit. Readings without noise, as in ideal dives,
-//! repeat whenever the vehicle moves steadily. For those, a repetition is no evidence.
+//! A noisy reading hardly ever equals the previous one to the last bit. Readings without noise, as in ideal dives,
+//! repeat whenever the motion is steady, so their repetition is no evidence.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,24 +11,24 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Minimum duration of identical readings before the unit counts as stuck.
 const HANGS_AFTER: DurNs = DurNs(500_000_000);
-/// Maximum probability that noise alone causes the repetition, as its logarithm: one in a billion.
+/// Maximum probability that noise alone causes the repetition, as a natural logarithm: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
-/// Weight of the latest difference, and of the latest run, in their running means.
+/// Weight of the latest difference and of the latest run in their running means.
 const LATEST: f64 = 1.0 / 64.0;
-/// Minimum share of sign reversals between successive differences for a reading to count as noisy.
+/// Minimum share of differences with a reversed sign at which readings count as noisy.
 ///
-/// White noise reverses two thirds of them, a motion hardly any.
+/// White noise reverses the sign of two thirds of the differences, and a motion reverses hardly any.
 const NOISY: f64 = 0.3;
 
 /// Repetition statistics of one source; part of the loop's state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct StuckSensor {
     last: Option<[f64; 3]>,
-    /// Last differences other than zero, by axis.
+    /// Last non-zero difference between successive readings, by axis.
     steps: [f64; 3],
-    /// Share of differences whose sign reversed, from 0 to 1.
+    /// Share of differences whose sign is the reverse of the one before, from 0 to 1.
     to_and_fro: f64,
-    /// Mean length of runs of identical readings, and length of the present run.
+    /// Mean length of runs of identical readings, and length of the present run, both in readings.
     usual_run: f64,
     run: u32,
     /// Start time of the present run.
@@ -36,7 +36,7 @@ pub struct StuckSensor {
 }
 
 impl StuckSensor {
-    /// Processes a turn rate; returns whether the unit is stuck by now.
+    /// Processes a turn rate; returns whether the unit counts as stuck now.
     ///
     /// Allocates: never.
     pub fn hangs(&mut self, at: MonoNs, rate_radps: Vec3<Sensor>) -> bool {
@@ -45,7 +45,7 @@ impl StuckSensor {
             (self.since, self.run) = (at, 1);
             return false;
         };
-        // Compared to the last bit, since a unit that hangs repeats its bytes.
+        // The comparison is bitwise, because a stuck unit repeats its bytes.
         if now.map(f64::to_bits) == before.map(f64::to_bits) {
             self.run = self.run.saturating_add(1);
             return self.has_hung(at);
@@ -76,7 +76,7 @@ impl StuckSensor {
 mod tests {
     use super::*;
 
-    /// Feeds readings at 400 Hz; returns after each whether the unit counts as stuck.
+    /// Feeds readings at 400 Hz; returns after each reading whether the unit counts as stuck.
     fn hangs(readings: impl IntoIterator<Item = [f64; 3]>) -> Vec<bool> {
         let mut repeats = StuckSensor::default();
         let mut of =
@@ -84,7 +84,7 @@ mod tests {
         (0..).zip(readings).map(&mut of).collect()
     }
 
-    /// Pseudorandom number from -1 to 1 (splitmix64).
+    /// Returns a pseudorandom number from -1 to 1 (splitmix64).
     fn noise(k: u64) -> f64 {
         let mut z = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn repeating_noisy_unit_is_stuck_after_half_a_second_until_it_changes() {
+    fn noisy_unit_with_constant_reading_is_stuck_after_0_5_s() {
         let frozen = noisy(999);
         let all = hangs(
             (0..1000).map(noisy).chain(std::iter::repeat_n(frozen, 1000)).chain((2000..2100).map(noisy)),
@@ -107,8 +107,8 @@ mod tests {
         assert!(all[first..2000].iter().all(|hangs| *hangs) && all[2000..].iter().all(|hangs| !hangs));
     }
 
-    /// The simulator's ideal units repeat a reading while the motion is steady, and change it with every change of
-    /// motion.
+    /// The simulator's ideal units repeat a reading while the motion is steady. Every change of motion changes the
+    /// reading.
     #[test]
     fn noise_free_unit_is_never_stuck() {
         let swaying = |k: u64| [1e-2 * math::sin(k as f64 / 800.0), 0.0, 2e-2 * math::cos(k as f64 / 1700.0)];
@@ -121,10 +121,12 @@ mod tests {
         assert!(hangs(all).iter().all(|hangs| !hangs));
     }
 
-    /// A coarse unit at rest repeats a reading for a while. The coarser it is, the longer the detection takes.
+    /// A coarse unit at rest repeats each reading for a while. The coarser the unit, the longer the detection
+    /// takes.
     #[test]
     fn coarse_unit_at_rest_is_not_stuck() {
-        // One reading in two hundred differs, so runs of three and even of two thousand are no evidence.
+        // One reading in two hundred differs. So a run of three readings is no evidence, and neither is one of two
+        // thousand.
         let coarse = |k: u64| {
             let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
             [step, 0.0, 0.0]

@@ -10,7 +10,7 @@ const USUAL_BAUD: u32 = 115_200;
 /// Highest serial rate accepted, baud.
 const MAX_BAUD: u32 = 12_000_000;
 
-/// A USB device by its descriptors, which are the same on any port.
+/// A USB device, identified by its descriptors, which are the same on any port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbIdentity {
     /// Vendor id.
@@ -21,12 +21,12 @@ pub struct UsbIdentity {
     pub serial: Option<String>,
 }
 
-/// A serial port.
+/// A serial port, identified by its path or by its USB adapter.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SerialPort {
     /// A device file; paths below `/dev/serial/by-id` stay the same after replugging.
     Path(String),
-    /// The port of a USB adapter, wherever it is plugged in.
+    /// The port of this USB adapter, wherever the adapter is plugged in.
     Usb(UsbIdentity),
 }
 
@@ -40,19 +40,19 @@ pub enum Connect {
         /// Bits per second; 8 data bits, no parity, 1 stop bit.
         baud: u32,
     },
-    /// `tcp:HOST:PORT`; the host connects to it.
+    /// `tcp:HOST:PORT`: the host opens a connection to the device.
     Tcp {
         /// Host name or address, and port.
         address: String,
     },
-    /// `udp:HOST:PORT`; packets are sent there, and its answers are received.
+    /// `udp:HOST:PORT`: the host sends packets to the device and receives the answers.
     Udp {
         /// Host name or address, and port.
         address: String,
     },
-    /// `udp-listen:ADDRESS:PORT[?from=HOST[:PORT]]`: a local port that the device sends to.
+    /// `udp-listen:ADDRESS:PORT[?from=HOST[:PORT]]`: a local port to which the device sends.
     ///
-    /// Only one sender is accepted: that of `from`, or the first whose message the device's driver accepts.
+    /// Only one sender is accepted: the one in `from`, or else the first whose message the device's driver accepts.
     UdpListen {
         /// Local address and port.
         address: String,
@@ -87,7 +87,7 @@ pub struct ConnectError {
     pub allowed: String,
 }
 
-/// All forms, for the error about an unknown one.
+/// All forms, listed in errors about a text with none of them.
 const FORMS: &str = "allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, \
      tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40";
 
@@ -150,9 +150,9 @@ impl Connect {
         }
     }
 
-    /// Returns the connection if its carrier is one of those that a device supports.
+    /// Returns the connection if the device supports its carrier.
     ///
-    /// Errors: its carrier is not among them.
+    /// Errors: the carrier is not among `carriers`.
     pub fn among(self, carriers: &[Carrier]) -> Result<Self, ConnectError> {
         if carriers.contains(&self.carrier()) {
             return Ok(self);
@@ -172,7 +172,7 @@ impl Connect {
 }
 
 impl Carrier {
-    /// Its name in `connect`.
+    /// Name of the carrier in `connect`.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Serial => "serial:",
@@ -259,7 +259,7 @@ fn udp_listen(rest: &str) -> Result<Connect, String> {
     if from.is_empty() {
         return Err("from= names no host; leave it out for the first valid sender".to_owned());
     }
-    // A bare IPv6 address has several colons and no port.
+    // An IPv6 address without a port has several colons.
     if from.matches(':').count() == 1 {
         host_and_port(from).map_err(|problem| format!("from={from:?}: {problem}"))?;
     }
@@ -277,7 +277,7 @@ fn host_and_port(rest: &str) -> Result<String, String> {
     }
 }
 
-/// Names of network interfaces have 15 characters at most. Source: Linux, IFNAMSIZ.
+/// Checks the name of a network interface, which has at most 15 characters. Source: Linux, IFNAMSIZ.
 fn can_interface(rest: &str) -> Result<String, String> {
     let allowed = |c: char| c.is_ascii_graphic() && c != '/' && c != ':';
     if rest.is_empty() || rest.len() > 15 || !rest.chars().all(allowed) {
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn every_form_survives_a_round_trip() {
+    fn every_connect_form_parses_and_prints_unchanged() {
         for text in [
             "serial:/dev/serial/by-id/usb-FTDI_A10K-if00?baud=115200",
             "serial:usb:0403:6001?baud=9600",

@@ -1,9 +1,10 @@
 //! Interface of a device's crate.
 //!
-//! A kind parses its part of a vehicle file. Each configured sensor has a driver, a decoder and an emulator.
+//! A kind parses its own keys in a sensor's table of a vehicle file. Each configured sensor has a driver, a decoder
+//! and an emulator.
 //!
-//! Finding and opening the port, decoding (pure) and applying (in the loop) are separate concerns. This file covers
-//! decoding, and the device's side of the wire for simulations.
+//! Opening the port, decoding bytes (pure) and using the readings (in the loop) are separate concerns. This file
+//! covers decoding, and the device's side of the wire for simulations.
 
 use super::driver::{Carrier, Driver, DriverSetup, Probe};
 use super::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
@@ -21,19 +22,19 @@ use serde::{Deserialize, Serialize};
 /// Keys common to all `[[sensors]]` tables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorConfig {
-    /// Name of the sensor and of its channel in the log.
+    /// Name of the sensor and of its log channel.
     pub id: String,
     /// Kind of device.
     pub plugin: String,
-    /// Connection, as written.
+    /// Connection, as written in the vehicle file.
     pub connect: String,
     /// Mount on the vehicle.
     pub mount: Mount,
-    /// Time from validity of a value to the receive time of its first byte.
+    /// Delay from the time of validity of a value to the receive time of its first byte.
     pub latency: DurNs,
 }
 
-/// A sensor as navigation uses it.
+/// Mount and kind of a sensor, for navigation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SensorInfo {
     /// Mount on the vehicle.
@@ -43,7 +44,7 @@ pub struct SensorInfo {
 }
 
 impl SensorInfo {
-    /// Creates a sensor at the vehicle's origin that navigation does not use.
+    /// Creates a sensor that is mounted at the vehicle's origin and that navigation does not use.
     pub fn other() -> Self {
         Self { mount: Mount { position: Vec3::zero(), rotation: Rot::identity() }, kind: SensorKind::Other }
     }
@@ -67,16 +68,16 @@ pub enum SensorKind {
     VelocityLog,
     /// A cable counter.
     Tether {
-        /// Chainage where it reads zero, m.
+        /// Chainage at which the counter reads zero, m.
         zero_at_m: f64,
-        /// Metres of chainage per metre of cable.
+        /// Metres of chainage per metre of counted cable.
         scale: f64,
     },
     /// A source that navigation does not use.
     Other,
 }
 
-/// Noise of an inertial unit according to its data sheet.
+/// Noise of an inertial unit according to its datasheet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InertialNoise {
     /// White noise of the gyros, quantisation included, rad/s/sqrt(Hz).
@@ -92,7 +93,7 @@ pub struct InertialNoise {
 /// Bias of an inertial sensor, in its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasSpec {
-    /// Standard deviation at power-on, constant from then on.
+    /// Standard deviation of the constant part, which is set at power-on.
     pub turn_on: f64,
     /// Standard deviation of its drift during operation.
     pub in_run: f64,
@@ -100,26 +101,26 @@ pub struct BiasSpec {
     pub time_s: f64,
 }
 
-/// Step and noise of a cable counter, from its vehicle file or preset.
+/// Step and noise of a cable counter, from the vehicle file or a preset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CounterSpec {
-    /// Smallest change of the length, m; `None` if each reading carries it.
+    /// Smallest change of the length, m; `None` if each reading carries the step.
     pub step_m: Option<f64>,
-    /// Noise without rounding, standard deviation, m; `None` if unknown.
+    /// Noise, standard deviation without rounding, m; `None` if unknown.
     pub sd_m: Option<f64>,
 }
 
-/// One kind of device, named in vehicle files as in `plugin = "imagenex881"`.
+/// One kind of device, named in vehicle files as `plugin`, for instance `plugin = "imagenex881"`.
 pub trait DeviceKind: Sync {
-    /// The name in vehicle files and in the logs' channel metadata.
+    /// The name in vehicle files and in the channel metadata of logs.
     fn name(&self) -> &'static str;
 
-    /// Parses this kind's keys of a sensor's table. `sensor` already contains the common ones.
+    /// Parses this kind's own keys in a sensor's table. `sensor` already contains the common keys.
     ///
-    /// Errors: a key with a value that is not allowed.
+    /// Errors: the value of a key is not allowed.
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError>;
 
-    /// Returns a probe for devices of this kind on a byte stream; `None` if they cannot be queried.
+    /// Returns a probe that finds devices of this kind on a byte stream; `None` if they cannot be queried.
     fn probe(&self) -> Option<Box<dyn Probe>> {
         None
     }
@@ -127,7 +128,7 @@ pub trait DeviceKind: Sync {
 
 /// Parts of a configured sensor that the loop uses.
 pub struct SensorSpec {
-    /// The common part of its table in the vehicle file.
+    /// Common keys of the sensor's table in the vehicle file.
     pub sensor: SensorConfig,
     /// Kind of sensor, for navigation.
     pub kind: SensorKind,
@@ -142,70 +143,72 @@ pub trait Device: Send + Sync {
     /// Returns the parts for the loop, with a decoder in its initial state.
     fn specification(&self) -> SensorSpec;
 
-    /// Returns the specification for scheduling; `None` unless it is a profiling head.
+    /// Returns the specification for scheduling; `None` unless the device is a profiling head.
     fn head(&self) -> Option<HeadSpec> {
         None
     }
 
-    /// Returns the modes at `range_m`, or at the configured range; only for a profiling head.
+    /// Returns the modes of a profiling head at `range_m`, or at the configured range; none for other devices.
     ///
-    /// Errors: a message about a range that the head does not have.
+    /// Errors: a message, if the head does not have this range.
     fn modes(&self, range_m: Option<f64>) -> Result<Vec<HeadMode>, String> {
         let _ = range_m;
         Ok(Vec::new())
     }
 
-    /// Returns the measured quantity, for simulations.
+    /// Returns the quantity that the device measures, for simulations.
     fn sense(&self) -> Sense;
 
     /// Returns the device's side of the wire, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
 
-    /// Returns the noise of an inertial unit if known. Navigation uses it unless the vehicle file overrides it.
+    /// Returns the noise of an inertial unit if known. Values in the vehicle file take precedence.
     fn inertial_noise(&self) -> Option<InertialNoise> {
         None
     }
 
-    /// Returns step and noise of a cable counter; `[navigation]` overrides the noise.
+    /// Returns the step and noise of a cable counter. The noise in `[navigation]` takes precedence.
     fn counter(&self) -> Option<CounterSpec> {
         None
     }
 
-    /// Returns the report descriptor of a HID device, which a rehearsal registers with the kernel.
+    /// Returns the report descriptor of a HID device, for a rehearsal to register an emulated device with the
+    /// kernel.
     fn report_descriptor(&self) -> Option<Vec<u8>> {
         None
     }
 
-    /// Writes the packet without optional payload to `shorter` and returns `true`.
+    /// Writes the packet without its optional payload to `shorter` and returns `true`.
     ///
-    /// Returns `false` if it has none, or if these bytes alone do not show that.
+    /// Returns `false` if the packet has no such payload, or if these bytes alone do not show that it has.
     fn without(&self, _what: OptionalPayload, _packet: &[u8], _shorter: &mut Vec<u8>) -> bool {
         false
     }
 
-    /// Returns what distinguishes its bytes from those of other devices of its kind on one line.
+    /// Returns the address that distinguishes the device's bytes from those of other devices of its kind on the
+    /// same line.
     ///
-    /// Devices with equal values, or with `None`, cannot share a line.
+    /// Devices with equal addresses, or without an address (`None`), cannot share a line.
     fn line_address(&self) -> Option<String> {
         None
     }
 
-    /// Returns allowed but seldom intended values of its keys: each key with the effect of its value.
+    /// Returns the keys with values that are allowed but seldom intended, each with the effect of its value.
     fn remarks(&self) -> Vec<(&'static str, String)> {
         Vec::new()
     }
 
-    /// Returns the supported carriers. UDP may replace any of them, one message per datagram.
+    /// Returns the supported carriers. UDP may replace any of them; each datagram then carries one message.
     fn carriers(&self) -> &'static [Carrier];
 
-    /// Returns the host's side of its line.
+    /// Returns the driver, which is the host's side of the device's line.
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
 }
 
-/// Payload that a log may omit; the readings stay bit-identical.
+/// Payload that a log may omit. The readings are bit-identical without it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OptionalPayload {
-    /// Echo strengths, if the range is sent as well.
+    /// Echo strengths, if the message also contains the range.
     Echoes,
     /// Geographic positions, and identifiers unique to one machine.
     Identity,
@@ -213,7 +216,8 @@ pub enum OptionalPayload {
 
 /// Converts bytes to readings: a codec with the device's configuration.
 ///
-/// Pure; runs in the loop. Its state depends on the decoded bytes; the configuration is not part of it.
+/// It is pure and runs in the loop. Its state depends only on the decoded bytes, and does not include the
+/// configuration.
 pub trait Decoder: Stateful + Send + Sync {
     /// Decodes a packet and calls `sink` for each completed reading.
     ///
@@ -223,7 +227,7 @@ pub trait Decoder: Stateful + Send + Sync {
     /// Counters of the codec.
     fn counts(&self) -> CodecCounts;
 
-    /// Number of decoded but withheld readings.
+    /// Number of readings that were decoded but withheld.
     ///
     /// Reasons: a bad status, a range setting other than the configured one, an unknown calibration, a jump, or an
     /// orientation that the device marks as invalid.
@@ -231,9 +235,9 @@ pub trait Decoder: Stateful + Send + Sync {
         0
     }
 
-    /// Returns statistics of the device's clock against the host's, if it sends its time.
+    /// Returns statistics of the device's clock against the host's; `None` if the device does not send its time.
     ///
-    /// They are for reports only, because readings are valid by the receive time.
+    /// The statistics are for reports only, because times of validity come from receive times.
     fn clock(&self) -> Option<ClockReport> {
         None
     }
@@ -242,15 +246,15 @@ pub trait Decoder: Stateful + Send + Sync {
 /// Initial conditions of an emulated device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EmulatorSetup {
-    /// Power-on time, at which its first action may take place.
+    /// Power-on time. The device does nothing before it.
     pub start: MonoNs,
-    /// For a head, its program.
+    /// Program of a head; `None` for other devices.
     pub head: Option<HeadProgram>,
     /// Water and location of the tunnel, as the operator knows them.
     pub site: Site,
-    /// Whether the polling host is emulated as well.
+    /// Whether the host that polls the device is emulated as well.
     ///
-    /// Otherwise the device answers requests passed to [`Emulator::hear`].
+    /// If not, the device answers requests passed to [`Emulator::hear`].
     pub polled: bool,
 }
 
@@ -266,27 +270,27 @@ pub enum Direction {
 /// Receives the traffic on a line: direction, time of the first byte, bytes.
 pub type LineSink<'a> = &'a mut dyn FnMut(Direction, MonoNs, &[u8]);
 
-/// Device side of the wire, with the host's polling of it; `M` is its measurement.
+/// Device side of the wire, and optionally a host that polls it. `M` is the type of its measurements.
 pub trait Emulator<M>: Send + Sync {
-    /// Adds the device's measurements before `until` that have not been returned yet, in order of time.
+    /// Adds to `due` the measurements that the device begins before `until`, in order of time, each only once.
     ///
     /// Times are on the device's clock.
     fn begin(&mut self, until: MonoNs, due: &mut Vec<M>);
 
-    /// Processes bytes from a host, at `at` on the device's clock.
+    /// Processes bytes that a host sent, at time `at` on the device's clock.
     ///
     /// A device that is not polled ignores them. Responses without a measurement go to `line`.
     fn hear(&mut self, _at: MonoNs, _bytes: &[u8], _line: LineSink<'_>) {}
 
-    /// Encodes a measurement onto the line, each message with its time.
+    /// Encodes a measurement and passes each message to `line` with its time.
     ///
-    /// It is called once for each measurement begun, in the same order. An emulator with an emulated host and no
-    /// begun measurement encodes imported ones. In those, values that are not finite were not measured, and no
-    /// message carries them.
+    /// It is called once for each measurement begun, in the same order. An emulator with an emulated host also
+    /// encodes imported measurements, which it did not begin. In imported measurements, a value that is not finite
+    /// was not measured, and no message carries it.
     fn tell(&mut self, measured: &M, line: LineSink<'_>);
 }
 
-/// An emulated device, by its kind of measurement.
+/// An emulated device with its type of measurement.
 pub enum Emulated {
     /// A profiling head.
     Head(Box<dyn Emulator<Sounding>>),
@@ -320,7 +324,7 @@ pub enum Sense {
 }
 
 impl Sense {
-    /// Name of such a device.
+    /// Name of a device that measures this quantity.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Head => "profiling head",

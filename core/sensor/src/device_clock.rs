@@ -1,10 +1,10 @@
 //! Model of a device's clock against the host's: unwraps its ticks and estimates its drift.
 //!
-//! A stamp arrives after a delay with a minimum, because buses and queues only add to it. The receive time less the
-//! device time therefore has a lower envelope, whose slope is the drift. The least delayed stamp of each stretch of
-//! time is kept, and a least-squares line is fitted to these. A constant delay shifts them all equally, which changes
-//! the offset but not the slope. If all slots are full, stretches are merged in pairs, so that ten hours need no more
-//! memory than two minutes.
+//! A device stamp arrives at the host after a minimum delay, and buses and queues only add to that delay. So the
+//! receive time less the device time has a lower envelope, and the slope of the envelope is the drift. Time is
+//! divided into stretches, and the least delayed stamp of each stretch is kept. A least-squares line is fitted to
+//! the kept stamps. A constant delay shifts all stamps equally, which changes the offset but not the slope. If all
+//! slots are full, stretches are merged in pairs, so that ten hours need no more memory than two minutes.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,25 +22,24 @@ const PLACES: usize = 128;
 /// Initial length of a stretch on the device's clock.
 const FIRST_SPAN_NS: i64 = 1_000_000_000;
 
-/// Minimum number of stretches for a drift estimate.
-///
-/// The scatter of fewer is a poor measure of its error.
+/// Minimum number of stretches for a drift estimate. The scatter of fewer stamps is a poor measure of the drift's
+/// error.
 const LEAST_STRETCHES: usize = 8;
 
-/// Largest deviation of a stamp from its prediction that is attributed to queues.
+/// Largest deviation of a stamp from its predicted time that is attributed to queues.
 ///
-/// Beyond it a new epoch begins. The prediction uses the last stamp and the receive times. For a clock that wraps
-/// sooner, the limit is a quarter of the wrap period.
+/// A larger deviation begins a new epoch. The prediction uses the last stamp and the receive times. The limit is at
+/// most a quarter of the wrap period, for a clock that wraps soon.
 const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
 /// Largest difference between the minimum delays of two stretches.
 ///
-/// It is a constant plus a share of the time between them. No clock drifts by more than the share. A stretch with a
-/// larger delay was queued, and is not kept.
+/// The limit is `MOST_SHIFT_NS` plus `MOST_DRIFT` times the time between the stretches. No clock drifts by more
+/// than this ratio. The stamp of a stretch with a larger delay was queued, and is not kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
 const MOST_DRIFT: f64 = 500e-6;
 
-/// Longest queueing delay; stretches that stay shifted for longer belong to a new epoch.
+/// Longest queueing delay. If stretches stay shifted for longer, a new epoch begins.
 const LONGEST_QUEUE_NS: i64 = 30_000_000_000;
 
 const LONGEST_TICK_NS: i64 = 900_000_000_000;
@@ -52,22 +51,22 @@ const PPM: f64 = 1e6;
 pub struct ClockReport {
     /// Stamps received.
     pub stamps: u64,
-    /// Number of times it restarted, or fell behind by more than queues can explain.
+    /// Number of times the clock restarted, or fell behind by more than queues explain.
     pub restarts: u64,
-    /// Number of times it ran ahead by more than queues can explain.
+    /// Number of times the clock ran ahead by more than queues explain.
     pub jumps: u64,
     /// Length of the epoch used for the drift, on the device's clock.
     pub span: DurNs,
-    /// Drift against the host's clock; `None` before there is enough data.
+    /// Drift against the host's clock; `None` until there is enough data.
     pub drift: Option<Drift>,
 }
 
 /// Rate error against the host's clock, parts per million. Positive: the device's clock is fast.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Drift {
-    /// The rate error.
+    /// Rate error, parts per million.
     pub ppm: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the rate error, parts per million.
     pub sd_ppm: f64,
 }
 
@@ -81,11 +80,11 @@ pub struct DeviceClock {
     restarts: u64,
     jumps: u64,
     epoch: Option<Epoch>,
-    /// Best drift of earlier epochs, and the span of that epoch.
+    /// Most certain drift of earlier epochs, and the length of the epoch that gave it.
     before: Option<(Drift, DurNs)>,
 }
 
-/// An uninterrupted run of the device's clock.
+/// A run of the device's clock without restart or jump.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Epoch {
     /// Receive time of the first stamp, the zero of device time.
@@ -104,15 +103,15 @@ struct Edge {
     kept: [Stamp; PLACES],
     len: usize,
     span_ns: i64,
-    /// The current stretch and its least delayed stamp.
+    /// Number of the current stretch, and its least delayed stamp.
     open: Option<(i64, Stamp)>,
     /// Slope for comparing stamps within a stretch.
     slope: f64,
-    /// Device time since which stretches have been shifted.
+    /// Device time since which the stretches have been shifted against the kept stamps.
     shifted_since_ns: Option<i64>,
 }
 
-/// Device time and delay of a stamp, both relative to the epoch's first, ns.
+/// Device time and delay of a stamp, both relative to the first stamp of the epoch, ns.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Stamp {
     device_ns: i64,
@@ -127,7 +126,7 @@ struct Line {
     mean_late_ns: f64,
 }
 
-/// Shift of a completed stretch against the epoch.
+/// Shift of a completed stretch against the kept stamps of the epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shift {
     None,
@@ -136,9 +135,9 @@ enum Shift {
 }
 
 impl DeviceClock {
-    /// A clock of `bits` bits (1 to 64) whose ticks are `tick` long (1 ns to 15 minutes).
+    /// Creates a clock of `bits` bits (1 to 64) with ticks of length `tick` (1 ns to 15 minutes).
     ///
-    /// Values outside are clamped.
+    /// Parameters outside these ranges are clamped.
     pub fn new(bits: u32, tick: DurNs) -> Self {
         Self {
             round: 1 << bits.clamp(1, 64),
@@ -151,9 +150,9 @@ impl DeviceClock {
         }
     }
 
-    /// Processes a stamp received at `received`; bits beyond the clock's width are ignored.
+    /// Processes a stamp received at `received`; ignores bits beyond the clock's width.
     ///
-    /// Returns the unwrapped time on the device's clock since the epoch's first stamp.
+    /// Returns the device time since the first stamp of the epoch, without wraps.
     pub fn take(&mut self, ticks: u64, received: MonoNs) -> DurNs {
         self.stamps += 1;
         let raw = i128::from(ticks).rem_euclid(self.round);
@@ -183,9 +182,9 @@ impl DeviceClock {
         self.begin(raw, received)
     }
 
-    /// Returns the earliest receive time of a stamp made at device time `device`.
+    /// Returns the earliest time at which the host could have received a stamp made at device time `device`.
     ///
-    /// `device` is as returned by [`Self::take`]. `None` until the drift is known.
+    /// [`Self::take`] returns such device times. `None` until the drift is known.
     pub fn earliest(&self, device: DurNs) -> Option<MonoNs> {
         let epoch = self.epoch.as_ref()?;
         let line = epoch.edge.line(self.tick)?;
@@ -195,7 +194,7 @@ impl DeviceClock {
         Some(epoch.begun + device + late)
     }
 
-    /// Returns the statistics so far. The drift is that of the epoch with the smallest standard deviation.
+    /// Returns the statistics so far. The drift comes from the epoch with the smallest standard deviation.
     pub fn report(&self) -> ClockReport {
         let now = self.drift_now();
         let best =
@@ -224,7 +223,7 @@ impl DeviceClock {
     fn drift_now(&self) -> Option<(Drift, DurNs)> {
         let epoch = self.epoch.as_ref()?;
         let line = epoch.edge.line(self.tick)?;
-        // One second of device time is 1 + slope seconds of host time.
+        // One second of device time lasts 1 + slope seconds of host time.
         let rate = 1.0 / (1.0 + line.slope);
         let drift = Drift { ppm: (rate - 1.0) * PPM, sd_ppm: line.slope_sd * rate * rate * PPM };
         Some((drift, self.span(epoch)))
@@ -232,7 +231,7 @@ impl DeviceClock {
 }
 
 impl Edge {
-    /// Creates an envelope with the epoch's first stamp as reference.
+    /// Creates an envelope; the first stamp of the epoch is its reference.
     fn new() -> Self {
         Self {
             kept: [Stamp::default(); PLACES],
@@ -264,13 +263,13 @@ impl Edge {
         self.kept.get(..self.len).unwrap_or_default()
     }
 
-    /// Ends the current stretch and keeps its stamp, unless it was queued.
+    /// Ends the current stretch and keeps its stamp, unless the stamp was queued.
     fn close(&mut self) -> Shift {
         let Some((_, stamp)) = self.open.take() else { return Shift::None };
         let shift = self.shift(stamp);
         if shift != Shift::None {
             if shift == Shift::Ahead && stamp.device_ns < LONGEST_QUEUE_NS {
-                // The earlier stretches were delayed instead: the epoch began within a queue.
+                // The earlier stretches were queued instead: the epoch began while a queue was full.
                 self.len = 0;
             } else {
                 let since = *self.shifted_since_ns.get_or_insert(stamp.device_ns);
@@ -286,13 +285,13 @@ impl Edge {
         Shift::None
     }
 
-    /// Returns the shift of a stamp against the last kept one.
+    /// Returns the shift of a stamp against the stamp kept last.
     fn shift(&self, stamp: Stamp) -> Shift {
         let Some(last) = self.kept().last() else { return Shift::None };
         let between_ns = stamp.device_ns.saturating_sub(last.device_ns) as f64;
         let late_ns = stamp.late_ns.saturating_sub(last.late_ns) as f64 - self.slope * between_ns;
         let most_ns = MOST_SHIFT_NS + MOST_DRIFT * between_ns;
-        // If a clock falls behind, its stamps look delayed.
+        // The stamps of a clock that falls behind look delayed.
         if late_ns > most_ns {
             Shift::Behind
         } else if late_ns < -most_ns {
@@ -315,7 +314,7 @@ impl Edge {
         }
     }
 
-    /// Doubles the length of stretches by merging them in pairs.
+    /// Merges stretches in pairs, which doubles their length.
     fn join(&mut self) {
         self.span_ns = self.span_ns.saturating_mul(2);
         let mut joined = [Stamp::default(); PLACES];
@@ -333,7 +332,7 @@ impl Edge {
         (self.kept, self.len) = (joined, len);
     }
 
-    /// Fits a line to the kept stamps, for a clock with a resolution of one tick.
+    /// Fits a line to the kept stamps; `tick` is the resolution of the clock.
     fn line(&self, tick: DurNs) -> Option<Line> {
         let kept = self.kept();
         if kept.len() < LEAST_STRETCHES {
@@ -352,7 +351,7 @@ impl Edge {
         let slope = xy / xx;
         let left = |(x, y): (f64, f64)| (y - slope * x) * (y - slope * x);
         let scatter = kept.iter().map(about).map(left).sum::<f64>() / (n - 2.0);
-        // Without scatter, the quantisation to a tick remains.
+        // Even stamps without scatter are uncertain by the rounding to a tick.
         let quantum = tick.0 as f64 * tick.0 as f64 / 12.0;
         let slope_sd = math::sqrt((scatter + quantum) / xx);
         (xx > 0.0).then_some(Line { slope, slope_sd, mean_device_ns, mean_late_ns })
@@ -367,14 +366,14 @@ impl Line {
 
 /// Returns the elapsed ticks for a raw `difference`.
 ///
-/// It adds the number of wraps that brings the result nearest to the time `waited`.
+/// It adds as many wraps as bring the result nearest to the time `waited`.
 fn advance(difference: i128, round: i128, tick: DurNs, waited: DurNs) -> i128 {
     let expected = i128::from(waited.0).div_euclid(i128::from(tick.0));
     let rounds = (expected - difference + round / 2).div_euclid(round);
     difference + rounds * round
 }
 
-/// Returns the less delayed stamp of the two, for a line of this slope.
+/// Returns the stamp with less delay above a line of this slope.
 fn earlier(a: Stamp, b: Stamp, slope: f64) -> Stamp {
     let allowed = slope * b.device_ns.saturating_sub(a.device_ns) as f64;
     if (b.late_ns.saturating_sub(a.late_ns) as f64) < allowed { b } else { a }

@@ -1,9 +1,8 @@
 //! Host side of a device's line, without I/O.
 //!
-//! It decides what to send and when, which bytes go to the loop, and how healthy the device is.
-//!
-//! A driver is a state machine run by a port's thread. Every call passes the time, so that tests can run it against
-//! an emulated device without a port, a thread or a clock.
+//! A driver decides which bytes to send and when, which bytes go to the loop, and whether the device is healthy. It
+//! is a state machine run by the thread of a port. Every call passes the time, so that tests can run a driver
+//! against an emulated device without a port, a thread or a clock.
 
 mod cutter;
 mod listener;
@@ -38,67 +37,68 @@ pub enum Carrier {
 pub struct DriverSetup {
     /// Start of the dive.
     ///
-    /// Each head runs its program from then on, or joins it at the due position. So the heads keep their relative
-    /// phase without communication between their drivers.
+    /// Each head runs its program from this time on. A head that joins later starts at the position that is due
+    /// then. So the heads keep their relative phase without communication between their drivers.
     pub begun: MonoNs,
-    /// For a head, its program.
+    /// Program of a head; `None` for other devices.
     pub head: Option<HeadProgram>,
 }
 
 /// I/O operations that a driver can use.
 pub trait Wire {
-    /// Sends bytes; on a message-based carrier, as one message.
+    /// Sends bytes, as one message on a message-based carrier.
     fn send(&mut self, bytes: &[u8]);
 
-    /// Writes on a polled bus, waits `settle` for the device, and reads `read_bytes`.
+    /// Writes to a device on a polled bus, waits for the time `settle`, and reads `read_bytes` bytes.
     ///
-    /// The bytes written, followed by those read, come back through [`Driver::heard`].
+    /// [`Driver::heard`] then receives the written bytes followed by the read bytes.
     fn exchange(&mut self, write: &[u8], settle: DurNs, read_bytes: usize);
 
-    /// Passes bytes on to the loop; `received` is the receive time of the first.
+    /// Passes bytes on to the loop; `received` is the receive time of the first byte.
     fn deliver(&mut self, received: MonoNs, bytes: &[u8]);
 }
 
 /// Health of a device, inferred from its traffic.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DeviceHealth {
-    /// Valid messages received from it.
+    /// Number of valid messages from the device.
     pub good_frames: u64,
     /// Identity that the device has reported.
     pub identity: Option<String>,
     /// Description of a fault, with its remedy.
     pub complaint: Option<String>,
-    /// Messages on its line from other senders that look like its own.
+    /// Messages of other senders on the line that look like messages of the device.
     pub strangers: IgnoredSenders,
 }
 
 /// Host side of one device's line.
 pub trait Driver: Send {
-    /// Notes that the line has been opened or reopened. The device may have been replaced or switched off meanwhile.
+    /// Reacts to the line being opened or reopened. The device may have been replaced or switched off meanwhile.
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// Notes that the line has been closed. Bytes sent are discarded.
+    /// Reacts to the line being closed. Bytes sent from now on are discarded.
     ///
-    /// The bytes of an incomplete frame are delivered as they are, since they may contain a complete one.
+    /// The bytes of an incomplete frame are delivered unchanged, because they may contain a complete frame.
     fn closed(&mut self, _wire: &mut dyn Wire) {}
 
-    /// Processes received bytes, the first of them at `received`. Undelivered bytes are lost to the loop and to the
-    /// log.
+    /// Processes received bytes; `received` is the receive time of the first byte.
+    ///
+    /// Bytes that the driver does not deliver are lost to the loop and to the log.
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire);
 
     /// Whether these bytes alone contain a message that this device could have sent.
     ///
-    /// On a line that anybody may send to, the sender of the first such bytes counts as the device from then on.
-    /// Others are ignored.
+    /// On a line with any number of senders, the sender of the first such bytes counts as the device. All other
+    /// senders are ignored.
     fn accepts(&self, bytes: &[u8]) -> bool;
 
-    /// Returns the time of the next [`Driver::wake`], if any.
+    /// Returns the time of the next call of [`Driver::wake`]; `None` if no call is needed.
     fn due(&self) -> Option<MonoNs>;
 
-    /// Acts at the time given by [`Driver::due`].
+    /// Performs the action that is due at the time given by [`Driver::due`].
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// Whether a response is pending, so that other drivers on the line must not transmit.
+    /// Whether a response is pending. Other drivers on the same line must not transmit meanwhile.
     fn awaits(&self) -> bool {
         false
     }
@@ -114,11 +114,12 @@ pub trait Driver: Send {
 
 /// Identifies a device of one kind on a line.
 ///
-/// Its requests are harmless to any other device there: nothing turns, and no setting persists.
+/// Its requests are harmless to any other device on the line: they start no motion and change no persistent
+/// setting.
 pub trait Probe: Send {
-    /// Returns the requests to send one after the other until there is an identity.
+    /// Returns the requests to send one after the other until the device has reported its identity.
     ///
-    /// Each has time for a response.
+    /// A pause for the response follows each request.
     fn questions(&self) -> Vec<Vec<u8>>;
 
     /// Processes received bytes, in pieces of any size.

@@ -1,9 +1,12 @@
 //! Interface between a device's crate and the rest of the program.
 //!
-//! A device has three separate parts. A codec with decoder turns bytes into [`reading::Reading`]s (pure). A driver is
-//! the host's side of its line (without I/O). An emulator is the device's side, for simulations. A device's crate
-//! depends on this crate alone, which re-exports the lower ones. A codec is a [`codec::Framing`] in
-//! [`codec::Framed`]:
+//! A device has three separate parts:
+//! - A codec and a decoder turn bytes into [`reading::Reading`]s. Both are pure.
+//! - A driver is the host's side of the device's line, without I/O.
+//! - An emulator is the device's side of the line, for simulations.
+//!
+//! A device's crate depends only on this crate, which re-exports the lower crates. A codec is a [`codec::Framing`]
+//! in [`codec::Framed`]:
 //!
 //! ```
 //! use headrace_sensor::codec::{Codec as _, Framed, Framing, Verdict};

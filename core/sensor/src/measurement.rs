@@ -1,6 +1,7 @@
-//! Measurements of simulated devices, between the water and the wire.
+//! Measurements of simulated devices, before they are encoded.
 //!
-//! An emulated device sets the time and angle of each, the simulation fills in the value, and the device encodes it.
+//! An emulated device sets the time and angle of each measurement. The simulation fills in the value, and the
+//! device encodes the measurement.
 
 use super::reading::Level;
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
@@ -15,7 +16,7 @@ pub trait Measurement: Copy + Send + Sync + 'static {
     fn set_at(&mut self, at: MonoNs);
 }
 
-/// A ping of a profiling head, or of a fixed echosounder, whose beam is along its x axis.
+/// A ping of a profiling head, or of a fixed echosounder whose beam is along its x axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sounding {
     /// Time of the ping.
@@ -28,7 +29,7 @@ pub struct Sounding {
     pub range_m: Option<f64>,
 }
 
-/// Pressure of the water at a depth sensor.
+/// Water pressure at a depth sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressure {
     /// Time of validity.
@@ -44,7 +45,7 @@ pub struct Inertia {
     pub at: MonoNs,
     /// Sample period.
     pub period: DurNs,
-    /// Attitude, sensor to level.
+    /// Attitude: rotation from the sensor's frame to the level frame.
     pub attitude: Rot<Level, Sensor>,
     /// Turn rate, mean over the period, rad/s.
     pub rate_radps: Vec3<Sensor>,
@@ -57,7 +58,7 @@ pub struct Inertia {
 pub struct GroundVelocity {
     /// Time of validity.
     pub at: MonoNs,
-    /// Velocity of the sensor itself, lever-arm rotation included, m/s.
+    /// Velocity of the sensor itself, m/s, which includes its motion by the vehicle's rotation.
     pub velocity_mps: Vec3<Sensor>,
 }
 
@@ -87,21 +88,21 @@ macro_rules! measurement {
 measurement!(Sounding, Pressure, Inertia, GroundVelocity, Payout);
 
 impl Sounding {
-    /// Creates a scheduled ping without its echo.
+    /// Creates a scheduled ping that has no echo yet.
     pub fn due(at: MonoNs, angle_rad: f64) -> Self {
         Self { at, angle_rad, reported_rad: angle_rad, range_m: None }
     }
 }
 
 impl Pressure {
-    /// Creates a scheduled measurement without its value.
+    /// Creates a scheduled measurement that has no value yet.
     pub fn due(at: MonoNs) -> Self {
         Self { at, pressure_pa: 0.0 }
     }
 }
 
 impl Inertia {
-    /// Creates a scheduled sample without its values.
+    /// Creates a scheduled sample that has no values yet.
     pub fn due(at: MonoNs, period: DurNs) -> Self {
         let (attitude, rate_radps, force_mps2) = (Rot::identity(), Vec3::zero(), Vec3::zero());
         Self { at, period, attitude, rate_radps, force_mps2 }
@@ -109,14 +110,14 @@ impl Inertia {
 }
 
 impl GroundVelocity {
-    /// Creates a scheduled measurement without its value.
+    /// Creates a scheduled measurement that has no value yet.
     pub fn due(at: MonoNs) -> Self {
         Self { at, velocity_mps: Vec3::zero() }
     }
 }
 
 impl Payout {
-    /// Creates a scheduled count without its value.
+    /// Creates a scheduled count that has no value yet.
     pub fn due(at: MonoNs) -> Self {
         Self { at, chainage_m: 0.0 }
     }

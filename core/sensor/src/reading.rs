@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
 use headrace_geometry::time::MonoNs;
 
-/// Level reference frame of an IMU: z up, x at its yaw of zero (magnetic or arbitrary north).
+/// Level reference frame of an IMU: z is up, and x is the direction of zero yaw (magnetic or arbitrary north).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Level {}
 
-/// Maximum number of sources of one loop.
+/// Maximum number of sources in one loop.
 pub const MAX_SOURCES: usize = 64;
 
-/// A registered source of bytes; also the second key of the total order of messages.
+/// Number of a registered source of bytes. Messages with equal times are ordered by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct SourceId(pub u16);
 
@@ -41,20 +41,20 @@ pub enum Reading {
     Echo(EchoRange),
     /// Absolute pressure of the water.
     Pressure(WaterPressure),
-    /// Orientation computed by the device: sensor frame to level.
+    /// Orientation computed by the device: rotation from the sensor's frame to the level frame.
     Attitude(Rot<Level, Sensor>),
     /// Turn rate, rad/s.
     AngularRate(Vec3<Sensor>),
-    /// Acceleration less gravity (specific force), m/s^2: at rest and level it is +9.8 along z.
+    /// Acceleration less gravity (specific force), m/s^2; +9.8 along z if the sensor is at rest and level.
     SpecificForce(Vec3<Sensor>),
     /// Velocity over ground, m/s.
     VelocityOverGround(Vec3<Sensor>),
-    /// Cable paid out, or another measurement of distance travelled.
+    /// Length of cable paid out, or another measurement of distance travelled.
     TetherLength(TetherLength),
 }
 
 impl Reading {
-    /// Whether all its numbers are finite.
+    /// Whether all numbers in the reading are finite.
     pub fn is_finite(&self) -> bool {
         let all = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
         match self {
@@ -79,9 +79,9 @@ impl Reading {
 /// A ping of a profiling head.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SonarReturn {
-    /// Head angle in the sensor's frame, radians: 0 down, increasing clockwise seen along +x.
+    /// Head angle in the sensor's frame, radians: 0 is down, and angles increase clockwise as seen along +x.
     ///
-    /// May exceed one turn.
+    /// The angle may exceed one turn.
     pub angle_rad: f64,
     /// Slant range computed by the device, m; `None` if nothing exceeded its threshold.
     pub range_m: Option<f64>,
@@ -118,11 +118,11 @@ pub struct WaterPressure {
 /// Cable paid out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TetherLength {
-    /// Length since the counter's zero, m, increasing as the vehicle goes in.
+    /// Length counted since the counter's zero, m; increases as the vehicle goes in.
     pub length_m: f64,
     /// Quantum of the length, m.
     pub resolution_m: f64,
-    /// Last restart of the count from zero; `length_m` continues without a step.
+    /// Last restart of the count from zero. `length_m` is continuous across the restart.
     pub restart: Option<CountRestart>,
 }
 
@@ -131,7 +131,7 @@ pub struct TetherLength {
 pub struct CountRestart {
     /// Number of the restart, from 1.
     pub number: u32,
-    /// Whether the counter was silent before it, as after being unplugged.
+    /// Whether the counter was silent before the restart, for instance because it was unplugged.
     pub was_away: bool,
 }
 

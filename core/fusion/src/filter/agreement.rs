@@ -1,4 +1,4 @@
-//! Detection of a divergent filter, whose wrong estimate rejects every measurement that would correct it.
+//! Detection of a divergent filter, whose wrong estimate rejects all measurements that would correct it.
 
 use core::ops::Range;
 
@@ -10,11 +10,12 @@ use headrace_sensor::device::SensorKind;
 
 /// Averaging length, in measurements of one kind.
 const MEMORY: u32 = 40;
-/// Minimum share of measurements within the gate. Below it, the measured quantity is lost and reacquired.
+/// Minimum share of measurements within the gate. Below it, the measured quantity counts as lost and is reacquired.
 const LEAST_AGREEING: f64 = 0.35;
-/// Standard deviations added when a quantity is lost, m, m/s, radians.
+/// Standard deviations added for a lost quantity, m, m/s, radians.
 ///
-/// They apply across the tunnel, along it, and to the attitude.
+/// They apply to position and velocity across the tunnel, to those along it (`LOST_WAY`), to the attitude, and to
+/// the scale of ranges.
 const LOST_M: f64 = 1.5;
 const LOST_MPS: f64 = 1.0;
 const LOST_WAY_M: f64 = 100.0;
@@ -24,14 +25,14 @@ const LOST_YAW_RAD: f64 = 0.1;
 const LOST_RAD: f64 = 1.0;
 const LOST_SCALE: f64 = 0.03;
 
-/// Tracks whether ranges agree with the wall, and attitudes with the tilt. `cable.rs` judges the cable.
+/// Tracks how well ranges agree with the wall, and attitudes with the estimated tilt. `cable.rs` judges the cable.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Agreement {
     wall: Memory,
     tilt: Memory,
 }
 
-/// Share of recent measurements of a kind within the gate.
+/// Share of recent measurements of one kind that passed the gate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Memory {
     seen: u32,
@@ -51,7 +52,7 @@ impl Memory {
         self.agreeing += share * (f64::from(u8::from(agrees)) - self.agreeing);
     }
 
-    /// Whether measurements and estimate disagree; if so, the average restarts.
+    /// Whether measurements and estimate disagree. If so, restarts the average.
     fn is_lost(&mut self) -> bool {
         let is_lost = self.seen == MEMORY && self.agreeing < LEAST_AGREEING;
         if is_lost {
@@ -62,26 +63,26 @@ impl Memory {
 }
 
 impl Agreement {
-    /// Notes whether a scalar update of a sensor of this kind passed its gate.
+    /// Records whether a scalar update of a sensor of this kind passed its gate.
     pub fn note(&mut self, kind: SensorKind, row: &ScalarUpdate, agrees: bool) {
         match kind {
             SensorKind::Head | SensorKind::Echosounder { .. } => self.wall.note(agrees),
-            // Only tilt counts, since a compass may stay disturbed for long.
+            // Only tilt counts, because a compass may stay disturbed for long.
             SensorKind::Imu if row.h.get(HEADING) == Some(&0.0) => self.tilt.note(agrees),
             _ => {}
         }
     }
 
-    /// Adds variances if a kind of measurement no longer agrees.
+    /// Adds to the variances if a kind of measurement no longer agrees with the estimate.
     ///
-    /// They go to the part of the state that it measures, and to the errors that may have caused the disagreement.
+    /// The additions go to the measured part of the state, and to the errors that may have caused the disagreement.
     pub fn seek(&mut self, variances: &mut Errors) {
         let [wall, tilt] = [&mut self.wall, &mut self.tilt].map(Memory::is_lost);
         if wall {
             add(variances, POSITION + 1..POSITION + 3, LOST_M);
             add(variances, VELOCITY + 1..VELOCITY + 3, LOST_MPS);
-            // A tilt error moves the estimate too, through gravity. Its cause has also turned the yaw, and the
-            // compass deviation may have absorbed that.
+            // A tilt error also moves the estimate, through gravity. The cause of the tilt error has also turned
+            // the yaw, and the compass deviation may have absorbed that turn.
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
             add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
             add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);
@@ -94,7 +95,8 @@ impl Agreement {
     }
 }
 
-/// Adds variances when the chainage is lost. No model is linearised about the chainage, so any distance will do.
+/// Adds to the variances when the chainage is lost. The addition may be large, because no model is linearised about
+/// the chainage.
 pub fn seek_way(variances: &mut Errors) {
     add(variances, POSITION..POSITION + 1, LOST_WAY_M);
     add(variances, VELOCITY..VELOCITY + 1, LOST_WAY_MPS);

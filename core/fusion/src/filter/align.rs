@@ -1,4 +1,4 @@
-//! Alignment: computes the first estimate from the readings of the first second.
+//! Alignment: computes the first estimate from about a second of readings.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,29 +23,32 @@ use headrace_sensor::reading::Reading;
 
 /// Alignment time.
 pub const LISTENS: DurNs = DurNs(1_000_000_000);
-/// Number of echoes per echosounder in the median.
+/// Maximum number of echoes per echosounder, of which the median is used.
 const ECHOES: usize = 9;
-/// Initial standard deviations.
+/// Initial standard deviations, in the order below.
 ///
-/// In this order: position in the section with echoes and without; chainage without a cable reading; yaw without a
-/// compass, when the vehicle is assumed to look along the tunnel; velocity; tilt.
+/// - Position in the section with echoes, and without.
+/// - Chainage without a cable reading.
+/// - Yaw without a compass. The vehicle is then assumed to face along the tunnel.
+/// - Velocity.
+/// - Tilt.
 const PLACE_SD_M: f64 = 0.3;
 const PLACE_UNSEEN_SD_M: f64 = 2.0;
 const CHAINAGE_UNTOLD_SD_M: f64 = 10.0;
 const YAW_UNTOLD_SD_RAD: f64 = 0.2;
 const VELOCITY_SD_MPS: f64 = 0.5;
 const TILT_SD_RAD: f64 = 0.05;
-/// Scale error of the cable from here on, a ratio; practically zero.
+/// Initial standard deviation of the cable's local scale error, a ratio; practically zero.
 ///
-/// Only a velocity log could separate it from speed. Otherwise the smallest persistent speed error would become a
-/// scale error, and that would become metres of chainage.
+/// Only a velocity log could distinguish a scale error from a speed error. Without this limit, the smallest
+/// persistent speed error would become a scale error, and then metres of chainage.
 const SCALE_SD: f64 = 1e-6;
 
 /// Readings collected during the alignment.
 #[derive(Debug, Clone)]
 pub struct Listening {
     since: Option<MonoNs>,
-    /// Chainage of the previous estimate, and its standard deviation, m.
+    /// Chainage of the lost estimate, and the standard deviation of that chainage, m.
     before: Option<(f64, f64)>,
     hears_wall: bool,
     attitude: Option<Rot<Tunnel, Body>>,
@@ -62,7 +65,7 @@ stateful!(Listening { state: since, before, hears_wall, attitude, force, told, h
 struct Told {
     at: MonoNs,
     chainage_m: f64,
-    /// Distance from the zero of the cable's scale, m.
+    /// Distance from the zero of the cable counter, m.
     way_m: f64,
     sd_m: f64,
 }
@@ -131,12 +134,12 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // The other sensors may also have returned only now.
+            // After a silence, the other sensors may also have returned only now. So the alignment starts here.
             self.since = Some(at);
         }
     }
 
-    /// Starts an alignment after the loss of an estimate with this chainage and standard deviation, m.
+    /// Creates an alignment after the loss of an estimate with this chainage and standard deviation, m.
     pub fn after(before: Option<(f64, f64)>) -> Self {
         Self { before, ..Self::default() }
     }
@@ -146,7 +149,7 @@ impl Listening {
         self.before
     }
 
-    /// Returns the part that is still missing.
+    /// Returns the part of a fix that is still missing.
     pub fn lacks(&self) -> NoFix {
         if self.attitude.is_none() && self.force.is_none() {
             NoFix::Heading
@@ -157,14 +160,15 @@ impl Listening {
         }
     }
 
-    /// Returns the start of the alignment, a time of validity.
+    /// Returns the start of the alignment, as a time of validity.
     pub fn since(&self) -> Option<MonoNs> {
         self.since
     }
 
-    /// Returns the first estimate at `at`, once the alignment has lasted long enough.
+    /// Returns the first estimate, valid at `at`; `None` until the alignment has lasted long enough.
     pub fn settle(&self, at: MonoNs, context: &Context) -> Option<(State, Factors<ERRORS>)> {
-        // After a loss, the alignment waits for an echo of the wall: without one, a new estimate would be no better.
+        // After a loss, the alignment waits for an echo of the wall. Without an echo, the new estimate would be no
+        // better than the lost one.
         if at.since(self.since?).0 < LISTENS.0 || (self.before.is_some() && !self.hears_wall) {
             return None;
         }
@@ -190,8 +194,8 @@ impl Listening {
 
     /// Builds the initial covariance.
     ///
-    /// Chainage and yaw errors are correlated with the errors of cable and compass, so that reading these again adds
-    /// no information. Slack is correlated with its rate.
+    /// Chainage and yaw errors are correlated with the errors of cable and compass. So later readings of cable and
+    /// compass add no information about the same errors. Slack is correlated with its rate.
     fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
         let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
@@ -212,10 +216,11 @@ impl Listening {
             }
         }
         let ones = [
-            // The part that is not correlated with the rate.
+            // Part of the slack that is not correlated with the slack rate.
             (SLACK, settings.slack.reach / core::f64::consts::SQRT_2),
             (SLACK_RATE, settings.slack.drive()),
-            // Error accumulated on the way to this place; from here on the scale error adds to it.
+            // Error accumulated between the zero of the counter and the present position. Later scale errors add to
+            // it.
             (CREEP, settings.scale_sd * self.told.map_or(0.0, |told| told.way_m.abs())),
             (SCALE, SCALE_SD),
             (DEPTH, settings.depth_offset_sd_m),
@@ -265,7 +270,7 @@ impl Heard {
     }
 }
 
-/// Attitude of a body at rest that faces along the tunnel, from the direction of gravity.
+/// Computes the attitude of a body at rest that faces along the tunnel, from the direction of gravity.
 fn level(force: Vec3<Body>) -> Rot<Tunnel, Body> {
     let roll = math::atan2(force.y(), force.z());
     let pitch = math::atan2(-force.x(), math::hypot(force.y(), force.z()));
@@ -283,9 +288,9 @@ mod tests {
 
     /// Repeated readings of cable and compass add no information.
     ///
-    /// Chainage and yaw stay as uncertain as slack, scale and deviation.
+    /// The chainage stays as uncertain as slack and scale, and the yaw stays as uncertain as the compass deviation.
     #[test]
-    fn readings_used_in_alignment_add_no_information_again() {
+    fn repeated_readings_after_alignment_add_no_information() {
         let context = Context {
             profile: shapes::ceran().unwrap(),
             site: Site::default(),

@@ -1,35 +1,36 @@
-//! Excess drift of inertial biases over the declared one, learnt from their corrections.
+//! Drift of inertial biases in excess of the declared drift, learnt from corrections of the biases.
 //!
-//! A measurement corrects a bias by its gain times the innovation. The expected square of that is the gain squared
-//! times the innovation's variance. If corrections are larger, the bias drifts more than the filter assumes.
-//! Derivation: `docs/why/navigation.md`, "Noise that is learnt".
+//! A measurement corrects a bias by its gain times the innovation. The expected square of this correction is the
+//! gain squared times the innovation's variance. If corrections are larger, the bias drifts more than the filter
+//! assumes. Derivation: `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
 use super::settings::{GaussMarkov, Settings};
 use headrace_geometry::math;
 
-/// Averaging time of the ratio, s.
+/// Averaging time of the ratio of squared corrections to expected squares, s.
 const MEMORY_S: f64 = 10.0;
-/// Mean ratio above which the noise is raised, and the power of the ratio by which it rises per second.
+/// Mean ratio above which the noise is raised. Per second, the noise rises by the ratio to the power
+/// `RAISES_PER_S`.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;
-/// Mean ratio below which a raised noise decays, and the time constant of the decay, s.
+/// Mean ratio below which a raised noise decays, and the time constant of this decay, s.
 const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
-/// Initial factor: a unit counts as restless until its readings show otherwise.
+/// Initial factor: the biases of a unit count as restless until its readings show otherwise.
 const AT_FIRST: f64 = 1e3;
-/// Random walk of the worst unit allowed for, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
+/// Random walk of the worst supported unit, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
 const MOST_RATE: f64 = 4.3e-4;
 const MOST_FORCE: f64 = 4.1e-3;
 
-/// Factors for gyros and accelerometers.
+/// Factors of the process noise of gyro and accelerometer biases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BiasDrift([Ratio; 2]);
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Ratio {
-    /// Decaying sums of squared corrections and of their expected values.
+    /// Decaying sums of the squared corrections and of their expected squares.
     corrected: f64,
     expected: f64,
     factor: f64,
@@ -41,27 +42,27 @@ impl Default for BiasDrift {
     }
 }
 
-/// Largest factor for a process, which makes it as restless as the worst unit.
+/// Returns the largest factor for a process. It makes the process as restless as in the worst unit.
 fn most(wander: GaussMarkov, worst: f64) -> f64 {
     let density = wander.density();
     (worst * worst / density).max(1.0)
 }
 
 impl BiasDrift {
-    /// Notes a correction.
+    /// Records a correction.
     ///
-    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the innovation's variance, and
-    /// its normalised square.
+    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the variance of the
+    /// innovation, and its normalised square.
     pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
         for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
-            // (P h / s)^2 s, summed over the axes.
+            // The expected square is (P h / s)^2 s, summed over the axes.
             let expected = covariances.iter().map(|c| c * c).sum::<f64>() / variance;
             ratio.expected += expected;
             ratio.corrected += expected * nis;
         }
     }
 
-    /// Adapts the factors after an epoch of `dt_s`.
+    /// Adapts the factors after an epoch of length `dt_s`.
     pub fn pass(&mut self, dt_s: f64, settings: &Settings) {
         let limits = [most(settings.rate_bias, MOST_RATE), most(settings.force_bias, MOST_FORCE)];
         for (ratio, most) in self.0.iter_mut().zip(limits) {

@@ -1,8 +1,9 @@
-//! Decision whether the cable counter and the estimate agree.
+//! Decides whether cable counter and estimate agree.
 //!
-//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are kept:
-//! readings are withheld, the inertial unit carries the chainage, and the chainage is as uncertain as the difference
-//! between both. Derivation: `docs/why/navigation.md`, "When cable and estimate disagree".
+//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are
+//! kept. The counter's readings are withheld, and the inertial unit alone carries the chainage. The chainage is as
+//! uncertain as the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
+//! estimate disagree".
 
 use serde::{Deserialize, Serialize};
 
@@ -13,52 +14,53 @@ use headrace_sensor::reading::SourceId;
 
 /// Averaging time of innovations, s.
 const RECENT_S: f64 = 1.0;
-/// Mean innovation, in its standard deviations, at which a dispute begins.
+/// Mean innovation at which a dispute begins, as a multiple of the mean's standard deviation for white innovations.
 ///
-/// From 3 to 6 the number of silent seeded dives is about the same. With 4, slack of seven times the declared size
-/// disputes a sound counter.
+/// For limits from 3 to 6, about the same number of seeded dives is silent. With 4, a slack of seven times the
+/// declared size causes a dispute with a sound counter.
 const DISPUTED_SDS: f64 = 5.0;
-/// Limit in standard deviations at which each innovation is clipped.
+/// Limit at which each innovation is clipped, in standard deviations.
 const MOST_SDS: f64 = 6.0;
 /// Smallest innovation that begins a dispute, m.
 const LEAST_M: f64 = 0.01;
-/// A counter on a lively cable is stuck when its count has not changed for this time.
+/// Time for which the count of a counter on a lively cable must be unchanged for the counter to count as stuck.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
-/// Least difference between two counts, m.
+/// Counts that differ by less than this are equal, m.
 const SAME_COUNT_M: f64 = 1e-6;
-/// Time after which a dispute is reported, and time over which agreement ends it.
+/// Time after which a dispute is reported, and time for which readings must agree to end it.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// Maximum sd of the innovation at which an agreeing reading rules out a loss, m.
+/// Maximum sd of the innovation at which an agreeing reading proves that nothing was lost, m.
 const SURE_M: f64 = 0.3;
-/// Tolerance of such a reading: a share of the vehicle's distance meanwhile, and a length, m.
+/// Maximum difference at which a reading has caught up: this share of the vehicle's distance since, plus this
+/// length, m.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
-/// Tolerance within which a counter runs as the vehicle does: a share of its distance, and a length, m.
+/// Maximum difference at which the counter runs like the vehicle: this share of the distance, plus this length, m.
 ///
-/// The agreement must last for the time and the distance below.
+/// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
 const SAME_M: f64 = 0.01;
 /// Additional share while the vehicle's own distance is uncertain.
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
-/// Difference of the hypotheses at which the estimate is given up, m, innovation sd included.
+/// Difference of the hypotheses at which the estimate is given up, m; includes the sd of the innovation.
 ///
-/// The counter must also have run by `ALIVE_M` meanwhile to count as alive.
+/// The counter must also have run by `ALIVE_M` since then, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 
 /// A dispute between counter and estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CableDoubt {
-    /// Time at which the readings left the expected range.
+    /// Time at which the readings left their expected range.
     pub since: MonoNs,
     /// Expected chainage at that time, m.
     pub from_m: f64,
     /// Largest difference so far between the counter and the other source, m.
     pub differs_m: f64,
-    /// Velocity log that it differs from; `None` for the estimate, which the inertial unit carries.
+    /// Velocity log that differs from the counter; `None` if the estimate differs.
     pub log: Option<SourceId>,
 }
 
@@ -67,17 +69,17 @@ pub struct CableDoubt {
 pub struct CableReading {
     /// Time of validity.
     pub at: MonoNs,
-    /// Chainage shown, m.
+    /// Chainage shown by the counter, m.
     pub shown_m: f64,
-    /// Shown less expected, m.
+    /// Shown chainage less expected chainage, m.
     pub off_m: f64,
     /// Standard deviation of `off_m`, m.
     pub sd_m: f64,
-    /// Whether it is within the gate.
+    /// Whether the reading is within the gate.
     pub agrees: bool,
-    /// Whether it agrees with the inertial unit's motion as well as usual.
+    /// Whether the reading agrees with the motion of the inertial unit as well as usual.
     pub is_usual: bool,
-    /// Whether slack moves the counter in steps all the time.
+    /// Whether slack constantly moves the counter by several steps.
     pub is_lively: bool,
 }
 
@@ -90,17 +92,17 @@ impl CableReading {
 /// Decision about a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Use {
-    /// Fuse it.
+    /// Fuse the reading.
     Fuse,
-    /// Ignore it.
+    /// Ignore the reading.
     Withhold,
-    /// Ignore readings from now on, and revert the corrections by the last ones.
+    /// Ignore readings from now on, and revert the counter's last corrections.
     ///
-    /// The values are the corrections of chainage and speed, m and m/s.
+    /// The values are these corrections of chainage and speed, m and m/s.
     Dispute([f64; 2]),
-    /// The counter runs correctly again and has lost or gained this length meanwhile, m: shown less expected.
+    /// The counter runs correctly again. The value is the difference that remains: shown less expected chainage, m.
     Slipped(f64),
-    /// Give up the estimate and restart from the running counter, which may be off by this much, m.
+    /// Give up the estimate and restart from the running counter, which may be wrong by this length, m.
     Seek(f64),
 }
 
@@ -109,9 +111,9 @@ pub enum Use {
 pub struct Cable {
     /// The last reading.
     last: Option<CableReading>,
-    /// The last reading whose count differs from the one before.
+    /// The last reading that has another count than the previous reading.
     changed: Option<CableReading>,
-    /// The first of successive readings beyond the gate.
+    /// The first of the present series of readings beyond the gate.
     left: Option<CableReading>,
     /// Recent effect of the counter's readings on the estimate.
     pub corrections: CounterCorrections,
@@ -122,21 +124,21 @@ pub struct Cable {
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Dispute {
-    /// The first reading that was withheld.
+    /// The first withheld reading.
     first: CableReading,
-    /// Reading since which the counter runs as the vehicle does.
+    /// Reading since which the counter runs like the vehicle.
     same_from: CableReading,
     /// Time since which readings agree again.
     agreeing_from: Option<MonoNs>,
-    /// Counter reading when the estimate was lost, m.
+    /// Counter reading at the time when the estimate was lost, m.
     lost_from_m: Option<f64>,
-    /// Longest distance since, by counter or estimate, and the largest difference, m.
+    /// Longest distance since the first withheld reading, by counter or estimate, and the largest difference, m.
     longest_m: f64,
     most_m: f64,
 }
 
 impl Cable {
-    /// Returns the dispute, once it has lasted long enough.
+    /// Returns the dispute once it has lasted for `NOTICED_AFTER`.
     pub fn doubt(&self, now: MonoNs) -> Option<CableDoubt> {
         let Dispute { first, most_m: differs_m, .. } = self.dispute?;
         let has_lasted = now.since(first.at).0 >= NOTICED_AFTER.0;
@@ -166,7 +168,7 @@ impl Cable {
         self.corrections.pass(dt_s, is_same);
         let off_sds = (reading.off_m / reading.sd_m).clamp(-MOST_SDS, MOST_SDS);
         self.mean_sds = left * self.mean_sds + (1.0 - left) * off_sds;
-        // Standard deviation of the running mean of white innovations.
+        // The mean is compared with the standard deviation of a running mean of white innovations.
         let is_apart = self.mean_sds.abs() > DISPUTED_SDS * math::sqrt((1.0 - left) / (1.0 + left));
         if let Some(first) = self.goes_wrong(reading, is_apart) {
             self.dispute = Some(Dispute::between(first, reading));
@@ -177,14 +179,15 @@ impl Cable {
 
     /// Returns the first of the readings that show a disagreement between counter and estimate.
     ///
-    /// `None` without one.
+    /// `None` if they agree.
     fn goes_wrong(&mut self, reading: &CableReading, is_apart: bool) -> Option<CableReading> {
         let lasts = |since: &CableReading, time: DurNs| reading.at.since(since.at).0 >= time.0;
         let changed = *self.changed.get_or_insert(*reading);
         if (changed.shown_m - reading.shown_m).abs() > SAME_COUNT_M {
             self.changed = Some(*reading);
         }
-        // Slack that moves a counter in steps all the time does not stop at once; a stuck wheel does.
+        // On a lively cable, slack keeps moving the counter. A count that suddenly stops changing means a stuck
+        // wheel.
         if reading.is_lively && lasts(&changed, STANDS_FOR) {
             return Some(changed);
         }
@@ -192,7 +195,7 @@ impl Cable {
         if reading.agrees {
             self.left = None;
         }
-        // An uncertain estimate needs the counter.
+        // If the estimate is uncertain, unusual readings begin no dispute, because the estimate needs the counter.
         let is_unusual = !reading.is_usual && reading.sd_m <= SURE_M;
         let disagrees = is_unusual || is_apart && reading.off_m.abs() > LEAST_M;
         disagrees.then_some(first)
@@ -200,7 +203,7 @@ impl Cable {
 }
 
 impl Dispute {
-    /// Starts a dispute at the first reading that disagreed.
+    /// Starts a dispute that began with the reading `first`.
     fn between(first: CableReading, reading: &CableReading) -> Self {
         Self {
             first,
@@ -242,16 +245,17 @@ impl Dispute {
         Use::Withhold
     }
 
-    /// Whether the counter shows most of the distance that the vehicle has travelled meanwhile.
+    /// Whether the counter shows most of the distance that the vehicle has travelled since the first withheld
+    /// reading.
     ///
-    /// The gate alone would accept a counter that is still stuck, once the estimate is uncertain enough.
+    /// The gate alone would accept a counter that is still stuck as soon as the estimate is uncertain enough.
     fn has_caught_up(&self, reading: &CableReading) -> bool {
         let way_m = (reading.expected_m() - self.first.expected_m()).abs();
         reading.off_m.abs() <= MISSING_SHARE * way_m + MISSING_M
     }
 }
 
-/// Distance between two readings, m: the longer of counter and estimate.
+/// Returns the distance between two readings, m: by counter or by estimate, whichever is longer.
 fn way_m(first: &CableReading, reading: &CableReading) -> f64 {
     let expected_m = (reading.expected_m() - first.expected_m()).abs();
     expected_m.max((reading.shown_m - first.shown_m).abs())
@@ -263,14 +267,15 @@ mod tests {
 
     const START: MonoNs = MonoNs(1_000_000_000);
 
-    /// A reading at time `t`, s, of a counter that is off by `off_m`; the gate is 3 standard deviations.
+    /// A reading at time `t`, s, of a counter that shows `off_m` too much. The gate is 3 standard deviations.
     fn reading(t: f64, shown_m: f64, off_m: f64, sd_m: f64) -> CableReading {
         let at = START + DurNs::from_secs_f64(t);
         let agrees = off_m.abs() <= 3.0 * sd_m;
         CableReading { at, shown_m, off_m, sd_m, agrees, is_usual: true, is_lively: false }
     }
 
-    /// Returns when a dispute begins, s, if the counter shows only a share of the distance at 0.1 m/s from 10 s on.
+    /// Returns when a dispute begins, s. The vehicle moves at 0.1 m/s; from 10 s on, the counter shows `share` of
+    /// the motion.
     fn disputed_at(share: f64, change: impl Fn(f64, &mut CableReading)) -> Option<f64> {
         let mut cable = Cable::default();
         (0..200).map(|k| f64::from(k) / 10.0).find(|t| {
@@ -282,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn stuck_or_slipping_counter_is_disputed_within_2_s() {
+    fn stuck_or_slipping_counter_is_disputed_within_4_s() {
         for (share, within_s) in [(0.0, 1.0), (0.4, 1.5), (-1.0, 0.8), (0.85, 4.0)] {
             let at_s = disputed_at(share, |_, _| {}).unwrap();
             assert!((10.1..10.0 + within_s).contains(&at_s), "{share}: {at_s}");
@@ -290,8 +295,8 @@ mod tests {
         assert_eq!(disputed_at(1.0, |_, _| {}), None);
     }
 
-    /// White innovations have a mean of 0.22 over a second. Innovations of 1.5 reach five times that after 1.4 s, and
-    /// those of 1 never do.
+    /// The running mean of white innovations has a standard deviation of 0.22. An innovation of constantly 1.5
+    /// brings the mean to five times this value after 1.4 s. An innovation of constantly 1 never does.
     #[test]
     fn biased_innovations_begin_a_dispute() {
         let off = |sds: f64, sd_m: f64| {
@@ -304,7 +309,7 @@ mod tests {
             assert!((found_s - at_s).abs() < 0.11, "{sds}: {found_s}");
         }
         assert_eq!(off(1.0, 0.01), None);
-        assert_eq!(off(3.0, 0.001), None, "too little to matter");
+        assert_eq!(off(3.0, 0.001), None, "a small innovation begins no dispute");
         let both_sides = disputed_at(1.0, |t, reading| {
             reading.off_m = if math::round_to_i64(10.0 * t) % 2 == 0 { 0.015 } else { -0.015 };
         });
@@ -312,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn unusual_motion_begins_a_dispute_within_the_gate() {
+    fn unusual_motion_within_the_gate_begins_a_dispute() {
         let at_s = disputed_at(1.0, |t, reading| reading.is_usual = t < 4.0).unwrap();
         assert!((at_s - 4.0).abs() < 1e-9, "{at_s}");
     }
@@ -331,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn dispute_reverts_the_last_second_of_a_stationary_count() {
+    fn dispute_on_a_stationary_count_reverts_the_last_second() {
         let mut cable = Cable::default();
         for k in 0..100_u32 {
             assert_eq!(cable.take(&reading(f64::from(k) / 10.0, 7.0, 0.0, 0.005)), Use::Fuse);
@@ -340,12 +345,12 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // A sum that decays over a second: 1 / (e^0.1 - 1) corrections.
+        // A sum of equal corrections that decays over a second contains 1 / (e^0.1 - 1) of them.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
     #[test]
-    fn position_sd_is_the_difference_of_counter_and_estimate() {
+    fn chainage_sd_equals_the_difference_of_counter_and_estimate() {
         let mut cable = Cable::default();
         assert_eq!(cable.take(&reading(0.0, 7.0, 0.01, 0.005)), Use::Fuse);
         assert_eq!(cable.differs_m().to_bits(), 0.0_f64.to_bits());
@@ -356,15 +361,16 @@ mod tests {
         assert_eq!(
             cable.doubt(START + DurNs::from_secs_f64(1.0)),
             None,
-            "a dispute shorter than a second is no doubt"
+            "a dispute shorter than a second is not reported"
         );
         let doubt = cable.doubt(START + DurNs::from_secs_f64(1.2)).unwrap();
         assert!((doubt.from_m - 7.02).abs() < 1e-12 && (doubt.differs_m - 0.5).abs() < 1e-12, "{doubt:?}");
     }
 
-    /// Returns when and how the dispute of a counter that was off by -0.4 m ends, s.
+    /// Returns when the dispute of a counter that was wrong by -0.4 m ends, s, and how it ends.
     ///
-    /// The vehicle moves at `speed_mps`, the counter shows `share` of that, and `sd_m` is uncertain.
+    /// The vehicle moves at `speed_mps`, and the counter shows `share` of this motion. The innovation has the sd
+    /// `sd_m`.
     fn ends(share: f64, speed_mps: f64, sd_m: f64) -> Option<(f64, Use)> {
         let reading = |t: f64| {
             let (expected_m, shown_m) = (7.0 + speed_mps * t, 6.6 + share * speed_mps * t);
@@ -375,17 +381,18 @@ mod tests {
         times.map(|t| (t, dispute.take(&reading(t)))).find(|(_, used)| *used != Use::Withhold)
     }
 
-    /// The tolerance is a tenth of the distance plus a centimetre, and four tenths while the vehicle's distance is
-    /// uncertain.
+    /// The tolerance is a tenth of the distance plus a centimetre.
+    ///
+    /// While the vehicle's own distance is uncertain, it is four tenths of the distance plus a centimetre.
     #[test]
-    fn dispute_ends_as_slip_once_the_counter_runs_correctly() {
+    fn dispute_ends_as_a_slip_once_the_counter_runs_like_the_vehicle() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [
             (1.0, 0.1, 0.0, 1.0, -0.4),
             (1.0, 0.2, 0.0, 1.0, -0.4),
             (0.95, 0.1, 0.0, 1.0, -0.405),
             (0.8, 0.1, 0.5, 1.0, -0.42),
             (1.3, 0.1, 0.5, 1.0, -0.37),
-            // Over five centimetres.
+            // At this speed, a distance of 5 cm takes longer than a second.
             (1.0, 0.03, 0.0, 1.7, -0.4),
         ] {
             let Some((found_s, Use::Slipped(found_m))) = ends(share, speed_mps, sd_m) else {
@@ -393,13 +400,14 @@ mod tests {
             };
             assert!((found_s - at_s).abs() < 1e-6 && (found_m - lost_m).abs() < 1e-6, "{found_s} {found_m}");
         }
-        // A stationary counter does not end it either, since the vehicle may be moving.
+        // A stationary counter does not end the dispute, whether the vehicle moves or not.
         for (share, speed_mps) in [(0.0, 0.02), (1.0, 0.0)] {
             assert_eq!(ends(share, speed_mps, 0.0), None, "{share} {speed_mps}");
         }
     }
 
-    /// Beyond a metre, the estimate is given up if the counter runs, and kept if the counter is stationary.
+    /// Beyond a metre, the estimate is given up if the counter runs. If the counter is stationary, the estimate is
+    /// kept.
     #[test]
     fn lost_estimate_restarts_from_a_running_counter() {
         let (_, used) = ends(2.0, 0.3, 1.1).unwrap();

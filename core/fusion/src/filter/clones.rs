@@ -1,9 +1,11 @@
 //! Relative error covariance between two epochs, by stochastic cloning.
 //!
-//! It is the error of the displacement between the epochs, which matters when two head passes are compared. It is
-//! smaller than the error of either position. A sample stays where it was georeferenced, so its error is that of the
-//! estimate at that time. Each clone keeps the covariance of the errors at its time. It also keeps their transition
-//! from the previous clone, through propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative
+//! The relative error is the error of the displacement between the epochs. It matters because coverage compares two
+//! head passes, and it is smaller than the error of either position. A sample stays where it was georeferenced, so
+//! its error is the error of the estimate at that time.
+//!
+//! Each clone keeps the covariance of the errors at its time, and the transition of errors since the previous
+//! clone. The transition includes propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative
 //! uncertainty".
 
 use serde::{Deserialize, Serialize};
@@ -19,7 +21,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 pub const STEP: DurNs = DurNs(2_000_000_000);
 /// Number of clones kept: over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
-/// Share to which the variance of the chainage must fall to count as a sudden gain.
+/// Ratio of the new to the old variance of the chainage below which the chainage counts as suddenly more certain.
 ///
 /// This happens, for instance, when a silent cable returns.
 const SURE_SHARE: f64 = 0.1;
@@ -31,7 +33,7 @@ type Square = [Errors; ERRORS];
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Moment {
     at: MonoNs,
-    /// Rows of the covariance at that time.
+    /// Rows of the covariance at the time of the clone.
     rows: [Errors; 3],
     /// Columns of the transition of errors from the previous clone.
     since_last: Square,
@@ -45,7 +47,7 @@ impl Moment {
         self.rows[0][POSITION]
     }
 
-    /// Whether its chainage is uncertain compared with a later one of this variance, m^2.
+    /// Whether the chainage is much more uncertain than a later chainage with this variance, m^2.
     fn is_unsure_beside(&self, later_m2: f64) -> bool {
         later_m2 < SURE_SHARE * self.chainage_m2()
     }
@@ -54,10 +56,10 @@ impl Moment {
 /// Clones of earlier errors, for relative covariances.
 #[derive(Debug, Clone)]
 pub struct ErrorClones {
-    /// Ring buffer.
+    /// Clones, in a ring buffer.
     clones: Vec<Moment>,
     count: usize,
-    /// Columns of the transition of errors from the newest clone until now.
+    /// Columns of the transition of errors from the newest clone to the present.
     since: Square,
 }
 
@@ -76,14 +78,14 @@ impl ErrorClones {
         (self.count, self.since) = (0, identity());
     }
 
-    /// Propagates the errors.
+    /// Propagates the errors by a transition.
     pub fn carry(&mut self, transition: &Transition) {
         for column in &mut self.since {
             transition.apply(column);
         }
     }
 
-    /// Applies the correction by a measurement to the errors.
+    /// Applies the correction by a measurement to the propagated errors.
     pub fn measure(&mut self, h: &Errors, gain: &Gain<ERRORS>) {
         for column in &mut self.since {
             let seen: f64 = column.iter().zip(h).map(|(c, h)| c * h).sum();
@@ -93,7 +95,7 @@ impl ErrorClones {
         }
     }
 
-    /// Adds a clone if the last one is old enough, or if the chainage has suddenly become more certain since.
+    /// Adds a clone if the newest one is old enough, or if the chainage has suddenly become more certain since.
     pub fn note(&mut self, at: MonoNs, factors: &Factors<ERRORS>) {
         let is_enough = |newest: &Moment| {
             at.since(newest.at).0 < STEP.0 && !newest.is_unsure_beside(factors.variance(POSITION))
@@ -113,20 +115,20 @@ impl ErrorClones {
         self.compare();
     }
 
-    /// Returns the covariance at the newest clone relative to `lag` earlier.
+    /// Returns the covariance of the newest clone relative to the time `lag` before it.
     ///
-    /// `None` with fewer than two clones. Extrapolates beyond the oldest clone.
+    /// `None` if there are fewer than two clones. A lag beyond the oldest clone is extrapolated.
     pub fn relative(&self, lag: DurNs) -> Option<Relative> {
         let newest = self.newest()?;
         let kept = self.clones.len();
-        // The relative covariance over no time is zero.
+        // Over no time, the relative covariance is zero.
         let (mut newer_s, mut newer, mut newer_m2) = (0.0, Relative::default(), newest.chainage_m2());
         let wanted_s = lag.as_secs_f64();
         for back in 1..kept {
             let clone = self.back(back)?;
             let age_s = newest.at.since(clone.at).as_secs_f64();
             if age_s >= wanted_s {
-                // Soundings placed in between were as uncertain as the earlier clone.
+                // All soundings before the sudden gain in certainty are as uncertain as the older clone.
                 if clone.is_unsure_beside(newer_m2) {
                     return Some(clone.relative);
                 }
@@ -135,13 +137,14 @@ impl ErrorClones {
             }
             (newer_s, newer, newer_m2) = (age_s, clone.relative, clone.chainage_m2());
         }
-        // Beyond the oldest clone, extrapolated linearly in time.
+        // Beyond the oldest clone, the covariance is extrapolated linearly in time.
         (kept > 1).then(|| newer.weighted(wanted_s / newer_s, &newer, 0.0))
     }
 
-    /// Compares each older clone with the newest.
+    /// Computes the covariance of each older clone relative to the newest one.
     ///
-    /// It works backwards and carries along how the newest errors depend on older ones.
+    /// It goes back through the clones and updates the matrix that maps a clone's errors to those of the newest
+    /// clone.
     fn compare(&mut self) {
         let Some(now) = self.newest().copied() else { return };
         let mut depends = MOVING.map(|i| core::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
@@ -164,9 +167,9 @@ impl ErrorClones {
     }
 }
 
-/// Returns the covariance of the difference of errors.
+/// Returns the covariance of the difference between the present and earlier errors.
 ///
-/// `depends` maps the earlier errors to the present ones.
+/// `depends` maps the earlier errors to the present errors.
 fn against(now: &[Errors; 3], then: &[Errors; 3], depends: &[Errors; 3]) -> Relative {
     let cross: [[f64; 3]; 3] = depends.map(|row| then.map(|column| sum(&row, &column)));
     let mut relative = [[0.0; 3]; 3];
@@ -202,9 +205,9 @@ mod tests {
 
     use super::*;
 
-    /// Soundings from before a silent cable returns stay uncertain.
+    /// Soundings placed before a silent cable returns stay uncertain.
     ///
-    /// They do not become gradually more certain over the last 2 s.
+    /// They do not become gradually more certain over the last 2 s before the return.
     #[test]
     fn chainage_before_a_sudden_gain_in_certainty_stays_uncertain() {
         let mut clones = ErrorClones::default();
@@ -220,7 +223,7 @@ mod tests {
         let sd_m = |clones: &ErrorClones, lag_s: f64| {
             clones.relative(DurNs::from_secs_f64(lag_s)).unwrap().sd_m(Vec3::zero())
         };
-        // The last clone before the return was 1.1 s old.
+        // The last clone before the cable's return was 1.1 s old.
         for lag_s in [0.1, 0.5, 1.1, 2.0, 4.0] {
             let is_m = sd_m(&clones, lag_s);
             assert!((is_m - 1.0).abs() < 0.01, "{lag_s}: {is_m}");
@@ -228,8 +231,7 @@ mod tests {
         for k in 52..=90 {
             clones.note(at(k), &factors);
         }
-        // Soundings placed since are certain: 5.1 s, 7.1 s and, as the newest, 8.1 s. Earlier ones are as uncertain
-        // as before.
+        // The clones since then, at 5.1 s and 7.1 s, are certain. Soundings placed before them stay uncertain.
         let [since_m, before_m] = [1.9, 4.0].map(|lag_s| sd_m(&clones, lag_s));
         assert!(since_m < 0.1 && (before_m - 1.0).abs() < 0.01, "{since_m} {before_m}");
     }

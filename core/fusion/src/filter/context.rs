@@ -1,4 +1,4 @@
-//! Configuration of the filter for one dive.
+//! Context of the filter in one dive: the design, the site and the settings.
 
 use super::setting_check::Design;
 use super::settings::Settings;
@@ -7,12 +7,12 @@ use headrace_geometry::site::Site;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
 
-/// Configuration of a dive.
+/// Design, site and settings of a dive.
 #[derive(Debug, Clone)]
 pub struct Context {
     /// Design profile.
     pub profile: Profile,
-    /// Water and location.
+    /// Water and location of the tunnel.
     pub site: Site,
     /// Noise settings of the sensors.
     pub settings: Settings,
@@ -21,7 +21,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// Returns the part that settings are checked against.
+    /// Returns the part of the context that setting checks need.
     pub(super) fn design(&self) -> Design<'_> {
         let Self { profile, site, settings, unit_at } = self;
         Design { profile, site, settings, unit_at: *unit_at }

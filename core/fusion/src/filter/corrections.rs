@@ -1,56 +1,60 @@
-//! Recent corrections of the estimate by the cable counter, and how much is lost if its wheel has stuck.
+//! Recent corrections of the estimate by the cable counter, and the error they cause if the counter's wheel has
+//! stuck.
 //!
-//! A stationary count means either that the vehicle is stationary or that the wheel has stuck. A filter that trusts
-//! the count stops the vehicle in both cases. So the alternative hypothesis is kept beside it: the estimate without
-//! these corrections. Derivation: `docs/why/navigation.md`, "A count that stands".
+//! A count that does not change means either that the vehicle is stationary or that the wheel has stuck. A filter
+//! that trusts the count stops the vehicle in both cases. So the filter also keeps the alternative hypothesis: the
+//! estimate without these corrections. Derivation: `docs/why/navigation.md`, "When cable and estimate disagree".
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Time for which corrections by a changing count are remembered, s.
+/// Time constant for forgetting corrections while the count changes, s.
 ///
-/// It is needed because a counter fails before the failure is noticed.
+/// They are kept for a while because a counter fails some time before the failure is noticed.
 const RECENT_S: f64 = 1.0;
-/// A count that is stationary for less than this may belong to a slow vehicle with coarse counter steps, s.
+/// Minimum time for which an unchanged count is a stop, s. Shorter times may come from slow motion and coarse
+/// steps.
 const STANDS_S: f64 = 2.0;
-/// Standard deviation of the loss, as a share of the corrections.
+/// Standard deviation of the possible loss, as a share of the corrections.
 ///
-/// A wheel is stuck in one case of ten, so the variance of the loss is a tenth of the corrections squared.
+/// In one of ten such cases the wheel is stuck, so the variance of the loss is a tenth of the squared corrections.
 const STUCK_SHARE: f64 = 0.3;
-/// Standard deviations of the corrections that count as chance.
+/// Corrections up to this many predicted standard deviations count as chance.
 ///
-/// With 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %. With 1, stuck
-/// wheels stay silent in 9 of 800, instead of 6.
+/// With 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %. With 1,
+/// stuck wheels stay silent in 9 of 800 dives, instead of 6.
 const CHANCE_SDS: f64 = 0.5;
-/// Time for which a loss counts between passes, s: about one turn of a head.
+/// Time for which a possible loss counts between passes, s: about one turn of a head.
 ///
-/// Corrections of a stationary count are also limited to its first such period. Later corrections of a hovering
-/// vehicle say nothing about the wheel.
+/// Only the corrections in the first such period of a stationary count are added up. Later corrections of a
+/// hovering vehicle say nothing about the wheel.
 const PASSES_S: f64 = 20.0;
 
-/// Corrections by the cable counter, and the loss they imply if its wheel has stuck.
+/// Corrections by the cable counter, and the possible loss if its wheel has stuck.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CounterCorrections {
     /// Corrections of chainage and speed in the last second, m and m/s.
     recent: [f64; 2],
-    /// Corrections since the count changed, including those; the speed corrections are integrated.
+    /// Corrections since shortly before the count stopped changing, m and m/s. The first sum includes the
+    /// integral of the second.
     sums: [f64; 2],
-    /// Standard deviations of the corrections that the covariance predicts, m and m/s.
+    /// Standard deviations that the covariance predicts for these sums, m and m/s.
     by_chance: [f64; 2],
     /// Time for which the count has been stationary, s.
     stood_s: f64,
-    /// Standard deviations of the possible loss since the count became stationary, and between passes, m.
+    /// Standard deviations of the possible loss, m: since the count became stationary, and between passes.
     lacks_m: f64,
     lost_m: f64,
-    /// Variance of the possible permanent loss that has not been taken yet, m^2.
+    /// Variance of the possible permanent loss since the last call of `take_slipped_m2`, m^2.
     slipped_m2: f64,
 }
 
 impl CounterCorrections {
-    /// Notes a fused reading.
+    /// Records the effect of a fused reading.
     ///
-    /// Inputs: its corrections of chainage and speed, m and m/s, and the variances it removed, m^2 and m^2/s^2.
+    /// Inputs: the corrections of chainage and speed, m and m/s, and the reductions of their variances, m^2 and
+    /// m^2/s^2.
     pub fn note(&mut self, by: [f64; 2], variances: [f64; 2]) {
         for sums in [&mut self.recent, &mut self.sums] {
             for (sum, by) in sums.iter_mut().zip(by) {
@@ -62,7 +66,7 @@ impl CounterCorrections {
         }
     }
 
-    /// Advances by the time since the previous reading, s; `is_same` if the count has not changed.
+    /// Advances by the time since the previous reading, s; `is_same` means that the count has not changed.
     pub fn pass(&mut self, dt_s: f64, is_same: bool) {
         self.lost_m *= math::exp(-dt_s / PASSES_S);
         self.recent = self.recent.map(|sum| sum * math::exp(-dt_s / RECENT_S));
@@ -79,7 +83,7 @@ impl CounterCorrections {
 
     fn stand(&mut self, dt_s: f64) {
         self.stood_s += dt_s;
-        // The corrected speed is missing in the distance.
+        // A wrong correction of the speed causes an error of the distance that grows with time.
         for [way_m, speed_mps] in [&mut self.sums, &mut self.by_chance] {
             *way_m += *speed_mps * dt_s;
         }
@@ -99,10 +103,11 @@ impl CounterCorrections {
         }
     }
 
-    /// Takes the corrections of the last second, m and m/s, and clears all corrections.
+    /// Returns the corrections of the last second, m and m/s, and clears all corrections.
     ///
-    /// A cable that is wound in by half metres corrects the estimate mostly rightly after its count changes. With all
-    /// corrections taken back, the chainage left the truth by 4 to 18 m instead of 1 to 3 m (scene `leak-current`).
+    /// On a cable that is wound in by half metres, most corrections after a change of the count are right. When all
+    /// corrections were reverted, the chainage error grew to between 4 and 18 m, instead of 1 to 3 m (scene
+    /// `leak-current`).
     pub fn take_back(&mut self) -> [f64; 2] {
         core::mem::take(self).recent
     }
@@ -112,7 +117,7 @@ impl CounterCorrections {
         self.lost_m
     }
 
-    /// Takes the variance of the possible permanent loss since the last call, m^2.
+    /// Returns the variance of the possible permanent loss since the last call, m^2, and clears it.
     pub fn take_slipped_m2(&mut self) -> f64 {
         core::mem::take(&mut self.slipped_m2)
     }
@@ -122,8 +127,9 @@ impl CounterCorrections {
 mod tests {
     use super::*;
 
-    /// Corrections of 1 mm and `speed_mps` at each of ten readings a second: the count changes for 10 s, then is
-    /// stationary.
+    /// Returns the state after ten readings a second, each of which corrects by 1 mm and `speed_mps`.
+    ///
+    /// The count changes for 10 s. Then it is stationary for `readings` readings.
     fn stood(readings: u32, speed_mps: f64, variances: [f64; 2]) -> CounterCorrections {
         let mut corrections = CounterCorrections::default();
         for k in 0..100 + readings {
@@ -133,13 +139,13 @@ mod tests {
         corrections
     }
 
-    /// A sum that decays over a second: 1 / (e^0.1 - 1) corrections plus the last one.
+    /// Number of corrections in a sum that decays over a second: 1 / (e^0.1 - 1), plus the last correction.
     fn lately() -> f64 {
         1.0 / (math::exp(0.1) - 1.0) + 1.0
     }
 
     #[test]
-    fn dispute_reverts_the_last_second_of_a_changing_count() {
+    fn dispute_on_a_changing_count_reverts_the_last_second() {
         let mut corrections = stood(0, -0.002, [0.0; 2]);
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
@@ -147,17 +153,17 @@ mod tests {
         assert_eq!(corrections, CounterCorrections::default());
     }
 
-    /// A long-standing error has also been trusted for long.
+    /// Even after a long stop, only the corrections of the last second are reverted.
     #[test]
-    fn dispute_reverts_a_long_stationary_count() {
+    fn dispute_after_a_long_stop_reverts_only_the_last_second() {
         let [way_m, speed_mps] = stood(50, -0.002, [0.0; 2]).take_back();
         assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
     }
 
-    /// The loss is the difference between the estimate with the counter and without it: a lost speed becomes a
-    /// distance.
+    /// The loss is the difference between the estimates with and without the counter. A speed correction adds
+    /// distance to it.
     #[test]
-    fn corrected_speed_adds_to_the_lost_distance() {
+    fn speed_corrections_add_to_the_possible_loss() {
         let speeds = (0..50).map(|k| 0.002 * (lately() + f64::from(k)));
         let expected_m = 0.001 * (lately() + 49.0) + speeds.map(|speed| 0.1 * speed).sum::<f64>();
         let lost_m = stood(50, 0.002, [0.0; 2]).lost_m();
@@ -165,10 +171,10 @@ mod tests {
     }
 
     #[test]
-    fn corrections_beyond_chance_add_a_tenth_of_their_square() {
+    fn possible_loss_is_0_3_of_corrections_beyond_chance() {
         let sure = stood(50, 0.0, [0.0; 2]);
         assert!((sure.lost_m() - 0.3e-3 * (lately() + 49.0)).abs() < 1e-6, "{}", sure.lost_m());
-        // Corrections half as large as chance allows.
+        // The predicted standard deviation makes half of the corrections count as chance.
         let chance_m = 0.001 * (lately() + 49.0);
         let variance = chance_m * chance_m / 54.0;
         let half = stood(50, 0.0, [variance, 0.0]);
@@ -179,9 +185,9 @@ mod tests {
         );
     }
 
-    /// Corrections of a hovering vehicle alternate in sign.
+    /// After the first 20 s, corrections have the opposite sign, as for a hovering vehicle.
     #[test]
-    fn long_stop_counts_by_its_first_20_s() {
+    fn corrections_after_20_s_of_a_stop_add_no_loss() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
         let first_m = corrections.lost_m();
         assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");
@@ -192,17 +198,17 @@ mod tests {
         assert!((corrections.lost_m() - first_m).abs() < 0.004, "{}", corrections.lost_m());
     }
 
-    /// The doubt counts for one turn of a head between passes, and permanently in the position. Coarse steps of a
-    /// slow vehicle are no stops.
+    /// The possible loss counts between passes for one turn of a head, and permanently in the position. A slow
+    /// vehicle with coarse steps makes short stops, which do not count.
     #[test]
-    fn doubt_about_a_stop_remains_when_the_count_changes() {
+    fn possible_loss_of_a_stop_remains_when_the_count_changes() {
         for (readings, slips) in [(15, false), (50, true)] {
             let mut corrections = stood(readings, 0.0, [0.0; 2]);
             let before_m = corrections.lost_m();
             corrections.pass(0.1, false);
             let slipped_m2 = corrections.take_slipped_m2();
             assert_eq!(slipped_m2 > 0.99 * before_m * before_m, slips, "{readings}: {slipped_m2}");
-            assert!(corrections.take_slipped_m2() == 0.0, "once");
+            assert!(corrections.take_slipped_m2() == 0.0, "the variance is taken only once");
             (0..200).for_each(|_| corrections.pass(0.1, false));
             assert!((corrections.lost_m() / before_m - math::exp(-20.1 / 20.0)).abs() < 1e-6);
         }

@@ -1,35 +1,36 @@
 //! Resolution step of a tether counter, recognised from its counts.
 //!
-//! A vehicle file may state a smaller step than the counter has, for instance that of its converter instead of its
-//! wheel. A counter that pauses between changes shows its step. Changes that are multiples of one step show it, too.
+//! A vehicle file may state a smaller step than the counter has, for instance the step of the converter instead of
+//! that of the wheel. If a counter pauses between changes, its smallest change is the step. If all changes are
+//! multiples of one length, this length is the step.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of changes per block. The step is the larger of the last two blocks', because a garbled reading spoils one
-/// of them.
+/// Number of changes per block. The larger step of the last two blocks counts, because a garbled reading spoils
+/// only one.
 const BLOCK: u32 = 50;
 /// Assumed step of a counter that has not moved yet, m; common steps are 0.5 mm to 1 cm.
 const COMMON_STEP_M: f64 = 0.01;
-/// Maximum number of readings that count as repeats of one rounding error.
+/// Maximum number of readings that are assumed to share one rounding error.
 const MOST_LOOKS: f64 = 50.0;
 
-/// Step detector of a tether counter. Changes are in stated steps.
+/// Step detector of a tether counter. It measures changes in units of the stated step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CountStep {
     last_m: Option<f64>,
     /// Time of the last change of the count.
     changed: MonoNs,
-    /// Smallest and largest change in the present block, and the greatest common divisor of its changes.
+    /// Smallest change, largest change and greatest common divisor of the changes in the present block.
     smallest: u64,
     largest: u64,
     common: u64,
-    /// Number of readings that differ from the one before, and number of those that do not.
+    /// Number of readings that differ from the previous reading, and number of readings equal to it.
     changes: u32,
     stands: u32,
-    /// Steps of the last two blocks that show one.
+    /// Steps found in the last two blocks that showed a step.
     blocks: [u64; 2],
 }
 
@@ -52,7 +53,7 @@ impl CountStep {
         self.changes += 1;
         if self.changes == BLOCK {
             let [_, latest] = self.blocks;
-            // Equal changes show a constant speed, but no step.
+            // Equal changes without pauses show a constant speed, but no step.
             if self.stands >= BLOCK / 5 {
                 self.blocks = [latest, self.smallest];
             } else if self.smallest < self.largest {
@@ -63,14 +64,14 @@ impl CountStep {
         }
     }
 
-    /// Returns the step, m: the stated one, or a larger one if the counts show it.
+    /// Returns the step, m: the stated step, or a larger one if the counts show it.
     pub fn step_m(&self, stated_m: f64) -> f64 {
         let [before, latest] = self.blocks;
         if before.max(latest) > 0 {
             return stated_m * before.max(latest) as f64;
         }
-        // Until a block is full, the smallest change so far is the best guess. Before the first change it is a common
-        // step.
+        // Until a block is full, the smallest change so far is the best guess. Before the first change, it is a
+        // common step.
         match (self.changes, self.stands >= self.changes) {
             (0, _) => stated_m.max(COMMON_STEP_M),
             (_, true) => stated_m * self.smallest as f64,
@@ -78,10 +79,11 @@ impl CountStep {
         }
     }
 
-    /// Returns how many readings share the rounding error of the present one.
+    /// Returns how many readings share the rounding error of the present reading.
     ///
-    /// `period` is the time between readings, and `way_m` the counter's movement in it, m. Readings since the last
-    /// change share the error. So do readings that repeat it because their distance is a whole number of steps.
+    /// `period` is the time between readings, and `way_m` the counter's movement in this time, m. All readings
+    /// since the last change of the count share an error. Readings also share an error if the movement between them
+    /// is a whole number of steps.
     pub fn looks_at_an_error(&self, at: MonoNs, period: DurNs, way_m: f64, step_m: f64) -> f64 {
         let stood = at.since(self.changed).as_secs_f64() / period.as_secs_f64();
         let steps = way_m / step_m;
@@ -90,7 +92,7 @@ impl CountStep {
     }
 }
 
-/// Greatest common divisor by Euclid's algorithm; every number divides zero.
+/// Greatest common divisor by Euclid's algorithm; the divisor of 0 and a number is the number.
 fn common_divisor(mut a: u64, mut b: u64) -> u64 {
     while b > 0 {
         (a, b) = (b, a % b);
@@ -102,15 +104,14 @@ fn common_divisor(mut a: u64, mut b: u64) -> u64 {
 mod tests {
     use super::*;
 
-    /// 50 readings a second.
+    /// Time of reading `k`, at 50 readings a second.
     fn at(k: u32) -> MonoNs {
         MonoNs(7_000_000_000 + 20_000_000 * u64::from(k))
     }
 
-    /// Recognised step, m, of a wheel with step `step_m` that shows `way_m`, as a function of time in s, 50 times a
-    /// second.
+    /// Returns the recognised step, m, of a wheel with step `step_m` after 3000 readings.
     ///
-    /// The counts are rounded to stated steps.
+    /// `way_m` is the cable's distance at a time in s. The wheel's counts are rounded to stated steps.
     fn recognised_m(step_m: f64, stated_m: f64, way_m: impl Fn(f64) -> f64) -> f64 {
         let mut step = CountStep::default();
         for k in 0..3000_u32 {
@@ -129,18 +130,18 @@ mod tests {
                 assert!((found_m - step_m).abs() <= 0.000_51, "{step_m} at {speed_mps}: {found_m}");
             }
         }
-        // Changes that are multiples of one step show it without pauses.
+        // Without pauses, a step is recognised if all changes are multiples of it.
         let found_m = recognised_m(0.01, 0.0005, |t| 2.0 * t + 1.7 * math::sin(0.7 * t));
         assert!((found_m - 0.01).abs() < 1e-9, "{found_m}");
     }
 
     #[test]
-    fn step_is_at_least_the_stated_one() {
+    fn recognised_step_is_at_least_the_stated_step() {
         for speed_mps in [0.003, 0.2] {
             let found_m = recognised_m(0.0005, 0.0005, |t| speed_mps * t + 0.02 * math::sin(0.4 * t));
             assert!((found_m - 0.0005).abs() < 1e-12, "{speed_mps}: {found_m}");
         }
-        assert!((recognised_m(0.0005, 0.02, |t| 0.2 * t) - 0.02).abs() < 1e-12, "as stated");
+        assert!((recognised_m(0.0005, 0.02, |t| 0.2 * t) - 0.02).abs() < 1e-12, "the stated step is used");
         assert!(
             (recognised_m(0.01, 0.0005, |_| 3.0) - COMMON_STEP_M).abs() < 1e-12,
             "a stationary counter has the common step"
@@ -148,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn one_garbled_reading_leaves_the_step() {
+    fn one_garbled_reading_does_not_change_the_step() {
         let mut step = CountStep::default();
         for k in 0..6000_u32 {
             let t = f64::from(k) / 50.0;
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_of_an_unchanged_count_or_whole_steps_share_a_rounding_error() {
+    fn unchanged_counts_and_whole_steps_share_a_rounding_error() {
         let mut step = CountStep::default();
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
         for k in 0..=20_u32 {
@@ -182,15 +183,15 @@ mod tests {
         }
     }
 
-    /// Before the first movement it is a common step, then the smallest change so far.
+    /// The guess is a common step before the first movement, and then the smallest change so far.
     #[test]
-    fn step_is_guessed_until_counts_show_it() {
+    fn step_is_guessed_before_the_first_block() {
         let mut step = CountStep::default();
         for k in 0..100 {
             step.hear(at(k), 3.0, 0.0005);
         }
         assert!((step.step_m(0.0005) - COMMON_STEP_M).abs() < 1e-12);
-        assert!((step.step_m(0.05) - 0.05).abs() < 1e-12, "as stated");
+        assert!((step.step_m(0.05) - 0.05).abs() < 1e-12, "the stated step is used");
         step.hear(at(100), 3.048, 0.0005);
         assert!((step.step_m(0.0005) - 0.048).abs() < 1e-12);
         step.hear(at(101), 3.0485, 0.0005);

@@ -1,9 +1,9 @@
-//! Decision whether the cable counter still counts from its first zero.
+//! Decides whether the cable counter still counts from its first zero.
 //!
-//! A count that restarts from zero gives no position. Either the counter was plugged in again, another counter
-//! replaced it, or the log continues with an earlier time of a dive. The chainage is kept only if the counter alone
-//! was away while the other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter
-//! begins again from zero".
+//! A count that restarts from zero gives no position. The counter may have been plugged in again or replaced, or
+//! the log may continue with an earlier time of a dive. The chainage is kept only if the counter alone was silent
+//! and the other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter begins again
+//! from zero".
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::TetherLength;
@@ -16,7 +16,8 @@ pub struct CounterZero {
     restarts: u32,
     /// Time of the counter's last reading.
     heard: Option<MonoNs>,
-    /// Time of the last reading of any other sensor, and their longest silence since the counter's.
+    /// Time of the last reading of any other sensor, and the longest silence of the others since the counter's last
+    /// reading.
     others: Option<MonoNs>,
     silence: DurNs,
     is_lost: bool,
@@ -28,13 +29,13 @@ impl CounterZero {
         self.is_lost
     }
 
-    /// Notes the receive time of a reading of any other sensor.
+    /// Records the receive time of a reading from any other sensor.
     pub fn hear_other(&mut self, received: MonoNs) {
         let before = self.others.replace(received).unwrap_or(received);
         self.silence = self.silence.max(received.since(before));
     }
 
-    /// Processes a reading of the counter; `is_sure` says that the chainage is known without it.
+    /// Processes a reading of the counter; `is_sure` means that the chainage is known without the counter.
     pub fn hear(&mut self, received: MonoNs, length: &TetherLength, is_sure: bool) {
         let number = length.restart.map_or(0, |restart| restart.number);
         let before = core::mem::replace(&mut self.restarts, number);
@@ -42,7 +43,7 @@ impl CounterZero {
         self.silence = DurNs(0);
         let Some(heard) = self.heard.replace(received) else { return };
         let was_away = length.restart.is_some_and(|restart| restart.was_away);
-        // A stop of the whole vehicle or its log silences all sensors.
+        // If the whole vehicle or the log stops, all sensors are silent for about the same time.
         let is_alone = others.0.saturating_mul(2) < received.since(heard).0;
         self.is_lost |= number != before && !(was_away && is_alone && is_sure);
     }
@@ -57,7 +58,7 @@ mod tests {
         TetherLength { length_m: 30.0, resolution_m: 0.001, restart }
     }
 
-    /// Whether the zero is lost when the counter is silent for one time and the others for another, ms.
+    /// Whether the zero is lost after a silence of the counter and a silence of the other sensors, ms.
     fn is_lost(counter_ms: u64, others_ms: u64, was_away: bool, is_sure: bool) -> bool {
         let at = |ms: u64| MonoNs(1_000_000_000 + 1_000_000 * ms);
         let mut zero = CounterZero::default();
@@ -79,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn restarts_before_the_first_reading_change_nothing() {
+    fn restart_before_the_first_reading_keeps_the_zero() {
         let mut zero = CounterZero::default();
         let restart = Some(CountRestart { number: 3, was_away: false });
         for ms in 0..3 {

@@ -1,8 +1,9 @@
 //! Comparison of distances along the tunnel by cable counter, velocity log and estimate.
 //!
-//! It finds differences beyond the data sheets. It uses readings, and never the filter's covariance, gates or learnt
-//! noise. So it still works when the filter has settled on a wrong speed. The inertial unit measures changes of speed
-//! only; `slack_level.rs` compares it with the counter. Derivation: `docs/why/navigation.md`, "Ways in raw form".
+//! It detects differences that the data sheets do not explain. It uses only readings and the estimated chainage,
+//! and never the filter's covariance, gates or learnt noise. So it still works when the filter has settled on a
+//! wrong speed. The inertial unit is not compared here, because it only measures changes of speed; `slack_level.rs`
+//! compares it with the counter. Derivation: `docs/why/navigation.md`, "Distances compared without the filter".
 
 use super::cable::CableDoubt;
 use super::settings::Settings;
@@ -18,47 +19,46 @@ use headrace_sensor::reading::{Reading, SourceId};
 
 /// Time windows over which distances are compared, s.
 const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
-/// Time between two comparisons, and capacity for those of the longest window.
+/// Time between two rows of distances, and capacity for the rows of the longest window.
 const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
-/// Capacity for the last readings of a source, and the minimum time between kept readings.
+/// Capacity for the last readings of a source, and the minimum time between two kept readings.
 ///
-/// At any reading rate, they span more than the filter's longest window.
+/// Together they cover more than the filter's longest window at any reading rate.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
-/// Silence after which a source is not compared.
-///
-/// A velocity log may send a reading only every two seconds.
+/// Silence after which a source is no longer compared. A velocity log may send a reading only every two seconds.
 const SILENT: DurNs = DurNs(3_000_000_000);
-/// Delay of the comparison, because readings arrive late.
+/// Delay of the comparison, because some readings arrive late.
 const BEHIND: DurNs = DurNs(500_000_000);
-/// Maximum difference in standard deviations, and how long the difference must exceed it.
+/// Maximum difference in standard deviations, and the time for which a larger difference must last.
 const MOST_SDS: f64 = 5.0;
 const LASTS: DurNs = DurNs(1_000_000_000);
-/// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, and its mount.
+/// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, plus the error of the mount.
 const LOG_SCALE: f64 = 0.015;
-/// Correlation time of its noise, s.
+/// Correlation time of a velocity log's noise, s.
 const LOG_TIME_S: f64 = 0.25;
 
-/// Columns of a row: distances by the cable counter, by the log, and by the estimate.
+/// Columns of a row: distances by the cable counter, by the velocity log, and by the estimate.
 const CABLE: usize = 0;
 const LOG: usize = 1;
 const ESTIMATE: usize = 2;
 
-/// Recent distances by each source, and the doubt that they cause.
+/// Recent distances by each source, and the doubt about the cable that they cause.
 #[derive(Debug, Clone)]
 pub(super) struct DistanceComparison {
-    /// Last readings of the counter as chainages, distance by the velocity log, and last estimates, m.
+    /// Last chainages by the counter, distances by the velocity log, and chainages by the estimate, m.
     cable: Vec<(MonoNs, [f64; 1])>,
     log: Vec<(MonoNs, [f64; 1])>,
     estimate: Vec<(MonoNs, [f64; 1])>,
-    /// The velocity log in the comparison.
+    /// Number of the compared velocity log.
     log_source: Option<usize>,
     /// Last attitude from an inertial unit.
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
-    /// Distances by column, m; NaN for a missing one.
+    /// Rows of distances, m; NaN for a missing distance.
     rows: Vec<(MonoNs, [f64; 3])>,
-    /// Time since which the cable has differed from log and estimate.
+    /// Time since which the cable has differed from the log, and time since which it has differed from the
+    /// estimate.
     since: [Option<MonoNs>; 2],
     doubt: Option<CableDoubt>,
     /// [`super::eskf::Eskf::ties`] of the estimate at the last comparison.
@@ -125,14 +125,14 @@ impl DistanceComparison {
         }
     }
 
-    /// Compares the distances up to an epoch's end.
+    /// Compares the distances at the end of an epoch.
     ///
-    /// `estimate_m` is the estimate's chainage there, m; `None` while the filter itself reports a dispute with the
-    /// cable. A change of `ties` means that earlier chainages are unrelated to later ones.
+    /// `estimate_m` is the estimated chainage at that time, m; `None` while the filter itself reports a dispute
+    /// with the cable. If `ties` has changed, earlier chainages are unrelated to later ones.
     ///
     /// Allocates: never.
     pub(super) fn compare(&mut self, at: MonoNs, estimate_m: Option<f64>, ties: u32, settings: &Settings) {
-        // While the filter reports a dispute, this comparison stays silent.
+        // While the filter itself reports a dispute, the estimate is not compared.
         if core::mem::replace(&mut self.ties, ties) != ties || estimate_m.is_none() {
             self.estimate.clear();
             self.forget(ESTIMATE);
@@ -156,7 +156,7 @@ impl DistanceComparison {
         self.judge(at, settings);
     }
 
-    /// Updates since when the cable differs from the others, and the largest lasting difference.
+    /// Updates the times since which the cable differs, and the doubt with the largest lasting difference.
     fn judge(&mut self, at: MonoNs, settings: &Settings) {
         let mut doubt: Option<CableDoubt> = None;
         for (k, other) in [LOG, ESTIMATE].into_iter().enumerate() {
@@ -184,17 +184,17 @@ impl DistanceComparison {
         });
     }
 
-    /// Chainage that the cable shows, m.
+    /// Returns the chainage that the cable shows, m.
     fn cable_m(&self) -> f64 {
         self.cable.last().map_or(0.0, |(_, [shown_m])| *shown_m)
     }
 
-    /// Returns the difference that has lasted.
+    /// Returns the doubt about the cable, if a difference has lasted.
     pub(super) fn doubt(&self) -> Option<CableDoubt> {
         self.doubt
     }
 
-    /// Removes the distances of a column.
+    /// Marks all distances of a column as missing.
     fn forget(&mut self, column: usize) {
         for (_, row) in &mut self.rows {
             if let Some(way_m) = row.get_mut(column) {
@@ -203,10 +203,10 @@ impl DistanceComparison {
         }
     }
 
-    /// Difference of the cable's distance from another one over the window, m.
+    /// Returns the difference between the distances by the cable and by another source in a time window, m.
     ///
-    /// The time may be shorter if both are not available for the whole window. `None` if one is missing or the
-    /// difference is within its tolerance.
+    /// If the sources were not both available for the whole window, a shorter time is compared. `None` if a
+    /// distance is missing or the difference is within its tolerance.
     fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {
         let (at, _) = self.rows.last()?;
         let both = |row: &[f64; 3]| {
@@ -223,15 +223,15 @@ impl DistanceComparison {
         let of_scale_m = math::hypot(settings.scale_sd, log_scale) * f64::max(cable_m.abs(), other_m.abs());
         let counter_m2 = 2.0 * settings.tether_sd_m * settings.tether_sd_m;
         let variance_m2 = counter_m2 + of_scale_m * of_scale_m + log_mps * log_mps * LOG_TIME_S * window_s;
-        // Slack is limited in both directions.
+        // Slack is limited, so its effect on a distance is limited in both directions.
         let slack_m = 2.0 * MOST_REACH_M.max(3.0 * settings.slack.reach);
         (differs_m > slack_m + MOST_SDS * math::sqrt(variance_m2)).then_some(differs_m)
     }
 }
 
-/// Appends a reading unless it is close to the last one.
+/// Appends a reading, unless it is close in time to the last one.
 ///
-/// An earlier or much later one restarts the list.
+/// If the time goes back or a long gap has passed, the list restarts with this reading.
 fn append(readings: &mut Vec<(MonoNs, [f64; 1])>, at: MonoNs, way_m: f64) {
     if readings.last().is_some_and(|(last, _)| (0..NEAR.0).contains(&at.since(*last).0)) {
         return;
@@ -254,7 +254,7 @@ mod tests {
     const TETHER: usize = 1;
     const DVL: usize = 4;
 
-    /// Position of a vehicle that moves to and fro, m, at a time in s.
+    /// Position of a vehicle that moves to and fro, m, at time `t`, s.
     fn way_m(t: f64) -> f64 {
         3000.0 + 0.2 * t + 2.0 * math::sin(t / 20.0)
     }
@@ -263,9 +263,9 @@ mod tests {
         0.2 + 0.1 * math::cos(t / 20.0)
     }
 
-    /// Compares for `lasts_s`; returns when a doubt first appeared, s, and the last doubt.
+    /// Compares distances for `lasts_s`; returns the time of the first doubt, s, and the last doubt.
     ///
-    /// Each function gives the value that a source shows at a time.
+    /// Each function returns the value that a source shows at a time.
     fn compared(
         lasts_s: u32,
         cable_m: impl Fn(f64) -> f64,
@@ -275,7 +275,7 @@ mod tests {
         compared_at(10, 1, lasts_s, (cable_m, log_mps, estimate_m))
     }
 
-    /// The same with a counter of `rate_hz` readings a second and a log with one reading for several of them.
+    /// Does the same with `rate_hz` counter readings a second, and one log reading for several of them.
     fn compared_at(
         rate_hz: u32,
         log_every: u32,
@@ -300,7 +300,7 @@ mod tests {
                 let moved = Vec3::new(along_mps, 0.02, 0.0);
                 ways.hear(at(t), DVL, &log, &Reading::VelocityOverGround(moved), &site);
             }
-            // An epoch is a tenth of a second.
+            // An epoch lasts a tenth of a second.
             if k.is_multiple_of(rate_hz / 10) {
                 ways.compare(at(t - 0.2), estimate_m(t - 0.2), 1, &settings);
             }
@@ -321,16 +321,16 @@ mod tests {
     }
 
     #[test]
-    fn velocity_log_off_by_a_fifth_is_named_with_the_difference() {
+    fn velocity_log_wrong_by_a_fifth_is_reported_with_the_difference() {
         let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
         let doubt = doubt.unwrap();
-        // A fifth of the last minute's 12 m, or less if the vehicle is slow.
+        // The difference is a fifth of the 12 m in a minute. It is smaller while the vehicle is slow.
         assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
         assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
     }
 
     #[test]
-    fn stationary_counter_differs_from_the_log_within_seconds() {
+    fn stuck_counter_is_doubted_within_8_s() {
         let stands = |t: f64| way_m(t.min(60.0));
         let (first_s, doubt) = compared(70, stands, |t| Some(speed_mps(t)), |t| Some(way_m(t.min(60.0))));
         assert!((61.0..68.0).contains(&first_s.unwrap()), "{first_s:?}");
@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_log_is_compared_once_it_returns() {
+    fn log_that_returns_after_silence_causes_no_doubt() {
         let log_mps = |t: f64| (!(30.0..50.0).contains(&t)).then(|| speed_mps(t));
         assert_eq!(compared(120, way_m, log_mps, |t| Some(way_m(t))), (None, None));
     }

@@ -36,87 +36,86 @@ use headrace_sensor::reading::{Reading, SonarReturn};
 
 mod counter;
 
-/// Capacity for the inertial sample times of an epoch.
+/// Capacity for the estimates within an epoch, one at each inertial sample.
 const KNOTS: usize = 256;
-/// Standard deviation of the velocity at rest, m/s: motion of the sea or of the deck.
+/// Standard deviation of the velocity at rest, m/s, caused by motion of the sea or of the deck.
 const REST_SD_MPS: f64 = 0.02;
 /// Standard deviation of the mean turn rate over a second at rest, rad/s.
 const REST_SD_RADPS: f64 = 1e-3;
-/// Gate of the rest hypothesis; a valid one exceeds it once in ten thousand times.
+/// Gate of the rest hypothesis. If the vehicle is at rest, the gate is exceeded once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// Standard deviation of a range below which a wall counts as flat, m.
+/// Standard deviation of the predicted range below which the wall counts as flat, m.
 ///
-/// The limit is the range's own noise if that is smaller.
+/// If the noise of the range is smaller, it is the limit instead.
 const NEAR_M: f64 = 0.03;
 /// Standard deviation of the speed prior, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
-/// Standard deviation added to an estimate beyond the wall, m.
+/// Standard deviation added to an estimate that lies beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
 
 /// Standard deviation below which the gyro bias counts as known, rad/s.
 ///
-/// A pass of 3 s is then off by a milliradian, and standing still longer would gain little.
+/// A pass of 3 s is then wrong by a milliradian. A longer stop would gain little.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
-/// Largest normalised squared innovation at which the wall may be as smooth as it has been so far.
+/// Maximum normalised squared innovation of a range at which the learnt smoothness of the wall applies.
 const SMOOTH: f64 = 4.0;
-/// Largest step of a counter, as a share of its noise, at which its rounding is negligible.
+/// Maximum step of a counter, as a share of its noise, at which the rounding is negligible.
 const FINE_SHARE: f64 = 0.2;
-/// Time within which an estimate settles.
+/// Time after the start within which an estimate settles.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Standard deviation of yaw below which the estimate counts as settled.
 ///
-/// Soundings then move by 5 cm at 6 m. A further gain in certainty would not be worth the loss of their relation to
-/// later ones.
+/// At 6 m, soundings then move by 5 cm. Beyond that, more certainty is not worth the loss of the relation between
+/// earlier and later soundings.
 const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
-/// Maximum number of steps of an epoch: its leg, two widenings of the covariance, and an end.
+/// Maximum number of steps in an epoch: the leg, two additions to the covariance, and an end.
 const STEPS: usize = 4;
 
 /// The estimate at one time, with its covariance.
 #[derive(Debug, Clone)]
 pub struct Eskf {
-    /// Time of the estimate; all readings valid before it have been fused.
+    /// Time of the estimate. All earlier readings have been fused.
     pub at: MonoNs,
     /// The estimated state.
     pub state: State,
-    /// Covariance of its errors.
+    /// Covariance of the state's errors.
     pub factors: Factors<ERRORS>,
-    /// Clones for relative covariances.
+    /// Clones of earlier errors, for relative covariances.
     pub clones: ErrorClones,
     /// Time of the last reacquisition of the chainage.
     pub way_sought: Option<MonoNs>,
-    /// Variance of the counter's possible loss while the vehicle was moving, m^2.
+    /// Variance of the counter's possible loss during motion, m^2.
     slipped_m2: f64,
-    /// Number of times later soundings have lost their relation to earlier ones.
+    /// Number of times at which the relation of later soundings to earlier ones was lost.
     pub ties: u32,
-    /// Start time of the estimate, and the standard deviation of yaw then or when it last halved, radians.
+    /// Start time of the estimate, and the standard deviation of yaw at the start or its last halving, radians.
     begun: (MonoNs, f64),
-    /// Number of times it has halved while the estimate settled.
+    /// Number of times this standard deviation has halved while the estimate settled.
     pub settled: u32,
-    /// Estimates through the last epoch, before its measurements.
+    /// Estimates within the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
     /// Comparison of the cable counter with the estimate.
     pub cable: Cable,
     unrest: BiasDrift,
     slack_level: SlackEstimate,
-    /// Roughness of the wall.
+    /// Learnt roughness of the wall.
     roughness: Roughness,
     seen_again: RepeatedBumps,
-    /// Share of the declared variance applied to ranges of heads until the gyro bias is known.
+    /// Share of the declared variance that applies to ranges of heads until the gyro bias is known.
     ///
-    /// It is the largest share among the heads.
+    /// It is the largest such share among the heads.
     smoothness: f64,
-    /// Whether the vehicle is known to be at rest; its heads then see the same bumps in every turn.
+    /// Whether the vehicle is known to be at rest. Its heads then see the same bumps in every turn.
     pub is_at_rest: bool,
-    /// Whether inertial data were missing in the last epoch. The vehicle's motion is then a guess, from which no
-    /// noise is learnt.
+    /// Whether inertial data were missing in the last epoch. The motion is then a guess, and no noise is learnt.
     is_blind: bool,
-    /// Settings that the ranges contradict.
+    /// Checks of settings against the ranges.
     pub suspicions: SettingChecks,
-    /// Variances to add at the end of the epoch.
+    /// Variances to add at the end of the epoch, because an estimate may be wrong.
     doubts: Errors,
-    /// Steps of the last epoch, for smoothing; empty unless they are kept.
+    /// Steps of the last epoch, for smoothing; empty unless `keeps_steps`.
     pub steps: Vec<Step>,
     keeps_steps: bool,
 }
@@ -155,15 +154,16 @@ impl Default for Eskf {
 }
 
 impl Eskf {
-    /// Keeps the data of each epoch for smoothing in `steps` from now on. The caller drains them after each epoch.
+    /// Records the steps of each epoch in `steps` from now on, for smoothing. The caller drains them after each
+    /// epoch.
     ///
-    /// Allocates: their buffer.
+    /// Allocates: the buffer for the steps.
     pub fn keep_steps(&mut self) {
         self.steps.reserve_exact(STEPS);
         self.keeps_steps = true;
     }
 
-    /// Starts with an estimate and its covariance.
+    /// Starts with a first estimate and its covariance.
     pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
         (self.at, self.state, self.factors) = (at, state, factors);
         self.clones.clear();
@@ -179,8 +179,8 @@ impl Eskf {
 
     /// Restarts the relation between passes whenever the standard deviation of yaw has halved.
     ///
-    /// While the estimate settles, samples become ever more certain. Earlier samples then say nothing about the
-    /// errors between later passes.
+    /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
+    /// about the errors between later passes.
     fn settle(&mut self) {
         let (begun, yaw_rad) = self.begun;
         let now_rad = self.pose_sd().yaw_rad;
@@ -193,7 +193,7 @@ impl Eskf {
         }
     }
 
-    /// Advances to a later time and fuses the window's readings up to it.
+    /// Advances to a later time, and fuses the readings in the window up to that time.
     pub fn advance(
         &mut self,
         to: MonoNs,
@@ -219,8 +219,8 @@ impl Eskf {
         }
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
-            // Each reading is compared with the best estimate so far, because the first readings after a silence move
-            // it far.
+            // Each reading is compared with the best estimate so far, because the first readings after a silence
+            // may change the estimate by metres.
             let known = errors;
             let later_s = to.since(waiting.at).as_secs_f64();
             let mut then = self.state_at(waiting.at);
@@ -264,7 +264,7 @@ impl Eskf {
         }
     }
 
-    /// Adds the speed of a force beyond the plausible limits, which may have been real, to the uncertainty.
+    /// Adds the speed change of an implausible force to the uncertainty, because the force may have been real.
     fn note_jolt(&mut self, speed_mps: f64, epoch_s: f64) {
         let variance = speed_mps * speed_mps;
         let way = variance * epoch_s * epoch_s;
@@ -274,7 +274,7 @@ impl Eskf {
         }
     }
 
-    /// Adds to the error variances; the estimate itself is unchanged.
+    /// Adds to the variances of the errors. The estimate itself does not change.
     fn widen(&mut self, variances: &Errors) {
         self.keep(self.at, &Move::Widened(*variances), self.state);
         self.factors.widen(variances);
@@ -288,12 +288,12 @@ impl Eskf {
         }
     }
 
-    /// Records that the estimate ends here.
+    /// Records that the estimate ends at its current time.
     pub fn keep_end(&mut self) {
         self.keep(self.at, &Move::End, self.state);
     }
 
-    /// Fuses zero velocity (ZUPT), unless it is too improbable, and a mean turn rate as the gyro bias.
+    /// Fuses zero velocity (ZUPT) and a mean turn rate as gyro bias, unless the estimate makes rest too improbable.
     pub fn rest(&mut self, mean_radps: Option<Vec3<Body>>) {
         let rows = measure::rest(&self.state, REST_SD_MPS);
         let unlikely = |row: &ScalarUpdate| {
@@ -333,7 +333,7 @@ impl Eskf {
         (state, leg)
     }
 
-    /// The estimate at a time within the last epoch, before its measurements.
+    /// Returns the estimate at a time within the last epoch, before the measurements of the epoch.
     fn state_at(&self, at: MonoNs) -> State {
         let next = self.knots.partition_point(|(knot, _)| *knot < at);
         let (before, after) = (self.knots.get(next.saturating_sub(1)), self.knots.get(next));
@@ -347,7 +347,7 @@ impl Eskf {
         before.between(after, share)
     }
 
-    /// Fuses an update whose residual refers to the estimate corrected by the `known` errors.
+    /// Fuses an update. Its residual refers to the estimate corrected by the errors in `known`.
     fn fuse(
         &mut self,
         row: &ScalarUpdate,
@@ -361,8 +361,8 @@ impl Eskf {
         row.noise += self.left_out(row.bends);
         let (kind, declared) = (source.sensor.kind, row.noise);
         let is_head_square = kind == SensorKind::Head && row.is_square();
-        // A counter's rounding error is shared by several readings. No noise is learnt from innovations in which it
-        // matters.
+        // Several readings share the rounding error of a counter. If this error matters, no noise is learnt from
+        // the innovation.
         let is_white = !matches!(&waiting.reading, Reading::TetherLength(length)
             if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m);
         if settings.learns && is_white {
@@ -372,7 +372,7 @@ impl Eskf {
         let along = self.factors.along(&row.h);
         let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
         if settings.learns && is_head_square {
-            // A residual too large for a smooth wall gets the weight of a rough one.
+            // If the residual is too large for a smooth wall, the declared noise of a rough wall applies.
             let smooth = row.noise * self.smoothness;
             if innovation * innovation <= SMOOTH * (of_estimate + smooth) {
                 row.noise = smooth;
@@ -390,7 +390,7 @@ impl Eskf {
             source.noise_level.note_share((innovation * innovation - of_estimate) / declared, is_near);
         }
         let relative = source.noise_level.relative(nis.min(settings.gate));
-        // Rocks move the ranges of heads in the same way as restless gyros would.
+        // Ranges of heads are excluded, because rocks change them in the same way as restless gyros would.
         if kind != SensorKind::Head {
             self.unrest.note([part(RATE_BIAS), part(FORCE_BIAS)], variance, relative);
         }
@@ -428,7 +428,7 @@ impl Eskf {
         }
     }
 
-    /// Variance that bumps of the wall give a range when many pings see the same bump, m^2.
+    /// Returns the variance of a range from bumps of the wall, m^2, if many pings see the same bump.
     ///
     /// 0 for other measurements.
     fn bumps(&self, kind: SensorKind, settings: &Settings) -> f64 {
@@ -436,9 +436,9 @@ impl Eskf {
         if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
     }
 
-    /// Returns the noise of one of many pings that see the same bump.
+    /// Returns the noise to use for one of many pings that see the same bump, m^2.
     ///
-    /// It also notes the ping for the roughness.
+    /// It also records the ping for the roughness.
     fn spread_over_looks(
         &mut self,
         row: &ScalarUpdate,
@@ -464,10 +464,10 @@ impl Eskf {
         noise_m2
     }
 
-    /// Variance of the second-order terms that an update neglects. It matters only while position or attitude is
-    /// hardly known.
+    /// Returns the variance of the second-order terms that an update neglects.
     ///
-    /// For a normal error e, f'' e^2 / 2 has a mean square of 3/4 (f'' sd^2)^2.
+    /// It matters only while position or attitude is very uncertain. For a normal error e, the mean square of f''
+    /// e^2 / 2 is 3/4 (f'' sd^2)^2.
     fn left_out(&self, [by_place, by_turn, by_both]: [f64; 3]) -> f64 {
         let sum = |axes: Range<usize>| axes.map(|i| self.factors.variance(i)).sum::<f64>();
         let (place, turn) = (sum(POSITION + 1..POSITION + 3), sum(ATTITUDE..ATTITUDE + 3));
@@ -475,9 +475,9 @@ impl Eskf {
         0.75 * bent * bent
     }
 
-    /// Inflates R by the measurement's curvature, evaluated at +-1 sd (sigma-point check).
+    /// Inflates the noise of a measurement by its curvature, evaluated at +-1 sd (sigma-point check).
     ///
-    /// `None` if there is no measurement at those points.
+    /// `None` if the measurement cannot be predicted at these points.
     fn straight(
         &self,
         mut row: ScalarUpdate,
@@ -501,9 +501,8 @@ impl Eskf {
         Some(row)
     }
 
-    /// Moves an estimate that lies beyond the wall back into the tunnel.
-    ///
-    /// No beam could be predicted from beyond the wall.
+    /// Moves an estimate that lies beyond the wall back into the tunnel, because no beam can be predicted from
+    /// there.
     fn stay_inside(&mut self, profile: &Profile) {
         let place = [self.state.position.y(), self.state.position.z()];
         if profile.contains(place) {
@@ -531,9 +530,9 @@ impl Eskf {
         PoseSd { along_m, ..PoseSd::of(&self.factors) }
     }
 
-    /// Standard deviation of the chainage that later samples share, m.
+    /// Returns the standard deviation of the chainage error that later samples share, m.
     ///
-    /// Excludes the counter's permanent losses.
+    /// It excludes the counter's possible permanent losses.
     pub fn along_sd_m(&self) -> f64 {
         math::hypot(PoseSd::of(&self.factors).along_m, self.cable.differs_m())
     }
@@ -554,12 +553,13 @@ impl Eskf {
         self.apply(row, &gain, known, errors);
     }
 
-    /// Corrects by a range to the wall.
+    /// Corrects by a range to the wall, and applies only a share of the correction of the attitude and related
+    /// errors.
     ///
-    /// Applies only a share of the correction of the attitude and related errors.
+    /// The covariance is Joseph's for the smaller gain. It equals the optimal covariance plus a dyad of the omitted
+    /// gain.
     ///
-    /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017. The covariance is Joseph's for the smaller gain,
-    /// which equals the optimal one plus a dyad of the omitted gain.
+    /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {
         let mut gain = self.factors.measure(&row.h, row.noise);
         let mut left_out = [0.0; ERRORS];

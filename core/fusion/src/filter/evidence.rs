@@ -1,4 +1,4 @@
-//! Sums for judging settings: for one parameter, and for a source that may be mounted in another's place.
+//! Sums that show whether a setting is wrong: for one parameter, or for a source that may have another mount.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,28 +6,29 @@ use headrace_geometry::math;
 
 /// Maximum number of range sources that are followed.
 pub(super) const FOLLOWED: usize = 12;
-/// One reading in this many is compared with its alternatives, because each comparison costs a ray.
+/// Out of this many readings, one is compared with its alternatives, because each comparison costs a ray.
 pub(super) const COMPARED: u32 = 4;
-/// Minimum number of blocks from which the uncertainty of a figure can be computed.
+/// Minimum number of blocks for computing the uncertainty of a figure.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
-/// Standard deviations above which a figure counts as certain.
+/// Standard deviations from zero above which a figure counts as certain.
 ///
-/// For an alternative the limit is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
+/// The limit for an alternative is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
 pub(super) const SURE: f64 = 6.0;
 pub(super) const SURE_GAIN: f64 = 3.0;
-/// Minimum normalised square that a parameter must explain, per reading of all sources.
+/// Minimum sum of normalised squares that a parameter must explain, per reading of all sources.
 ///
-/// It is a seventh of their noise.
+/// It corresponds to a parameter that changes ranges by a seventh of their noise.
 const EXPLAINS: f64 = 0.02;
 /// Unknowns of the vehicle's pose within a spell: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
-/// Largest residual that counts in a comparison, m, since some echoes come from other objects.
+/// Limit at which residuals are clipped in a comparison, m, because some echoes come from other objects.
 const MOST_MISSED_M: f64 = 0.5;
-/// Minimum mean square residual of a source, m^2, and the share that an alternative may leave.
+/// Minimum mean square residual of a source whose mount is doubted, m^2; maximum ratio of the residual squares with
+/// the alternative to those without it.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
-/// Sums of one parameter within a spell, next to those of the vehicle's pose.
+/// Sums of one parameter within a spell, and its products with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Line {
     pub(super) by_pose: [f64; POSE],
@@ -47,7 +48,7 @@ pub(super) struct Fit {
     values_2: f64,
 }
 
-/// Comparison of a source's fit at its own mount with the fit at another mount, or turned by half a turn.
+/// Comparison of two fits of a source: at its own mount, and at another mount or turned by half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Alternative {
     pub(super) source: u16,
@@ -55,7 +56,8 @@ pub(super) struct Alternative {
     pub(super) is_echo: bool,
     /// Sums of the present block, and of all earlier blocks.
     ///
-    /// Each has own squares, squares of the alternative, and number of readings.
+    /// Each has three sums: squared residuals at the own mount, squared residuals of the alternative, number of
+    /// readings.
     pub(super) block: [f64; 3],
     pub(super) all: [f64; 3],
     pub(super) blocks: u32,
@@ -77,7 +79,7 @@ pub(super) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Forward substitution.
+/// Solves a lower triangular system by forward substitution.
 pub(super) fn solved(factor: &[[f64; POSE]; POSE], right: [f64; POSE]) -> [f64; POSE] {
     let mut solution = [0.0; POSE];
     for (i, (row, right)) in factor.iter().zip(right).enumerate() {
@@ -90,7 +92,7 @@ pub(super) fn solved(factor: &[[f64; POSE]; POSE], right: [f64; POSE]) -> [f64; 
 }
 
 impl Fit {
-    /// Adds the sums of a block; `readings` counts all sources.
+    /// Adds the sums of a block; `readings` is the number of readings of all sources.
     pub(super) fn add(&mut self, [weight, value]: [f64; 2], readings: u32) {
         if weight <= 0.0 {
             return;
@@ -104,12 +106,12 @@ impl Fit {
         self.values_2 += value * value;
     }
 
-    /// Whether there are enough blocks for a statement.
+    /// Whether there are enough blocks for an estimate.
     pub(super) fn is_settled(&self) -> bool {
         self.blocks >= FEWEST_BLOCKS
     }
 
-    /// Returns the estimate and its standard deviation from the scatter of blocks.
+    /// Returns the estimate and its standard deviation, computed from the scatter of blocks.
     pub(super) fn estimate(&self) -> Option<[f64; 2]> {
         if self.blocks < FEWEST_BLOCKS || self.weight <= 0.0 {
             return None;
@@ -120,11 +122,11 @@ impl Fit {
         Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
     }
 
-    /// Returns the estimate and its distance from zero in sd, if it is certainly beyond `least`.
+    /// Returns the estimate and its distance from zero in sd, if it certainly exceeds `least`.
     ///
-    /// The standard deviation includes the scatter of blocks and the noise of ranges, because blocks alone may hardly
-    /// scatter. `None` if the parameter hardly changes any range: an estimate from millimetres reflects model errors
-    /// of walls and beams.
+    /// The standard deviation is the larger one of the scatter of blocks and the noise of ranges, because blocks
+    /// alone may hardly scatter. `None` if the parameter hardly changes any range: an estimate from millimetres
+    /// only shows errors of the wall and beam models.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
         let [estimate, scatter] = self.estimate()?;
         let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));
@@ -132,14 +134,14 @@ impl Fit {
         (estimate.abs() >= least && sure_sd >= SURE && shows).then_some((estimate, sure_sd))
     }
 
-    /// Sum of normalised squares that the parameter explains.
+    /// Returns the sum of normalised squares that the parameter explains.
     pub(super) fn explains(&self) -> f64 {
         self.value * self.value / self.weight.max(f64::MIN_POSITIVE)
     }
 }
 
 impl Alternative {
-    /// Adds a reading: residuals at its own mount and at the other mount, m.
+    /// Adds a reading, given by its residuals at the own mount and at the other mount, m.
     pub(super) fn note(&mut self, missed_m: [f64; 2]) {
         let [own, theirs] = missed_m.map(|missed_m| missed_m.abs().min(MOST_MISSED_M));
         for (sum, part) in self.block.iter_mut().zip([own * own, theirs * theirs, 1.0]) {
@@ -161,7 +163,7 @@ impl Alternative {
         self.gains_2 += gain * gain;
     }
 
-    /// Share of its squares that the alternative leaves.
+    /// Returns the ratio of the squared residuals of the alternative to those at the own mount.
     pub(super) fn share_left(&self) -> f64 {
         let [own, theirs, _] = self.all;
         theirs / own.max(f64::MIN_POSITIVE)
@@ -169,7 +171,8 @@ impl Alternative {
 
     /// Returns by how many standard deviations the alternative fits better.
     ///
-    /// `None` unless it certainly does and leaves little. For two swapped sources, the limit applies to both.
+    /// `None` unless it certainly fits better and the ratio `share_left` is small. For two swapped sources,
+    /// `share_left` covers both of them.
     pub(super) fn certain(&self, share_left: f64) -> Option<f64> {
         let [own, _, readings] = self.all;
         let n = f64::from(self.blocks);
@@ -182,7 +185,7 @@ impl Alternative {
         (sure_sd >= SURE_GAIN).then_some(sure_sd)
     }
 
-    /// Sum of normalised squares that the alternative explains, for a range noise of 3 cm.
+    /// Returns the sum of normalised squares that the alternative explains, for a range noise of 3 cm.
     pub(super) fn explains(&self) -> f64 {
         let [own, theirs, _] = self.all;
         (own - theirs) * f64::from(COMPARED) / (0.03 * 0.03)
@@ -193,7 +196,7 @@ impl Alternative {
 mod tests {
     use super::*;
 
-    /// A fit to identical blocks, as without noise, of a parameter that changes ranges by `changes_sd` standard
+    /// Returns a fit to identical blocks without noise. The parameter changes ranges by `changes_sd` standard
     /// deviations.
     fn alike(changes_sd: f64, by: f64) -> Fit {
         let mut fit = Fit::default();
@@ -202,9 +205,9 @@ mod tests {
         fit
     }
 
-    /// An alternative gains a varying number of square metres; its certainty equals that of the mean gain.
+    /// The gain of an alternative varies between blocks. The alternative is as certain as its mean gain.
     #[test]
-    fn alternative_is_as_certain_as_its_blocks_agree() {
+    fn certainty_of_an_alternative_follows_the_scatter_of_its_blocks() {
         let sure_sd = |scatter_m2: f64| {
             let mut alternative = Alternative::default();
             for k in 0..8 {
@@ -215,8 +218,8 @@ mod tests {
             }
             alternative.certain(alternative.share_left())
         };
-        // The mean gain is 0.2 m^2. Eight values that alternate around it by the scatter give it an sd of scatter
-        // over the root of seven.
+        // The mean gain is 0.2 m^2. Eight gains alternate around it by the scatter, so its sd is the scatter over
+        // the root of seven.
         for scatter_m2 in [0.05, 0.04, 0.02] {
             let expected = 0.2 / scatter_m2 * math::sqrt(7.0);
             let found = sure_sd(scatter_m2).unwrap();
@@ -227,8 +230,8 @@ mod tests {
     #[test]
     fn parameter_with_negligible_effect_is_not_certain_despite_low_scatter() {
         assert!(alike(1.0, 0.05).certain(0.03).is_some());
-        assert!(alike(0.2, 0.2).certain(0.03).is_some(), "6 mm of 3 cm");
-        assert_eq!(alike(0.1, 0.2).certain(0.03), None, "3 mm");
+        assert!(alike(0.2, 0.2).certain(0.03).is_some(), "ranges change by 6 mm, noise 3 cm");
+        assert_eq!(alike(0.1, 0.2).certain(0.03), None, "ranges change by 3 mm");
         assert_eq!(alike(0.001, 1e9).certain(0.03), None, "a rotated head in a round pipe");
         assert_eq!(alike(1.0, 0.02).certain(0.03), None, "below the reporting limit");
     }

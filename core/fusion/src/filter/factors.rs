@@ -1,8 +1,8 @@
-//! A covariance kept as its factors: P = U D U^T, U unit upper triangular, D diagonal.
+//! A covariance kept as its factors: P = U D U^T, with U unit upper triangular and D diagonal.
 //!
-//! Updates change D only by products and quotients of positive numbers. P therefore stays symmetric and non-negative,
-//! however badly it is scaled. Updates of P itself, Joseph's form included, fail when a precise measurement follows a
-//! long drift (see the tests).
+//! Updates change D only by products and quotients of positive numbers. P therefore stays symmetric and
+//! non-negative, however badly it is scaled. Updates of P itself, Joseph's form included, fail when a precise
+//! measurement follows a long drift (see the tests).
 //!
 //! Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977: V.3 (measurement), III.4
 //! (addition of a dyad, after Agee and Turner).
@@ -12,12 +12,13 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 /// Factors of the covariance of `N` errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factors<const N: usize> {
-    /// Columns of U: `u[j][i]` is its element (i, j). Elements below the diagonal are never read; the diagonal is 1.
+    /// Columns of U: `u[j][i]` is element (i, j). Elements below the diagonal are never read, and the diagonal is
+    /// 1.
     u: [[f64; N]; N],
     d: [f64; N],
 }
 
-/// Result of a scalar measurement.
+/// Gain of a scalar measurement, and the variance of its innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gain<const N: usize> {
     /// Kalman gain: change of each error per unit of innovation.
@@ -26,11 +27,11 @@ pub struct Gain<const N: usize> {
     pub variance: f64,
 }
 
-/// Process noise of one or two errors.
+/// Process noise that drives one error, or two errors together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     variance: f64,
-    /// Indices of the errors and their weights; the first has the higher index.
+    /// Indices and weights of the errors. The first error has the higher index.
     weights: [(usize, f64); 2],
 }
 
@@ -47,7 +48,7 @@ impl<const N: usize> Stateful for Factors<N> {
 }
 
 impl<const N: usize> Factors<N> {
-    /// Creates independent errors with these variances, which must not be negative.
+    /// Creates factors of independent errors with these variances, which must not be negative.
     pub fn independent(variances: [f64; N]) -> Self {
         let mut u = [[0.0; N]; N];
         for (j, column) in u.iter_mut().enumerate() {
@@ -69,12 +70,12 @@ impl<const N: usize> Factors<N> {
         self.covariance(i, i)
     }
 
-    /// Rows of the covariance.
+    /// Rows `rows` of the covariance.
     pub fn rows<const M: usize>(&self, rows: [usize; M]) -> [[f64; N]; M] {
         rows.map(|i| core::array::from_fn(|j| self.covariance(i, j)))
     }
 
-    /// Variance of the sum of the errors, weighted by `h`.
+    /// Variance of the sum of all errors, weighted by `h`.
     pub fn variance_along(&self, h: &[f64; N]) -> f64 {
         let columns = self.u.iter().zip(&self.d).enumerate();
         let terms = columns.map(|(j, (column, d))| {
@@ -84,7 +85,7 @@ impl<const N: usize> Factors<N> {
         terms.sum()
     }
 
-    /// Covariances of all errors with their sum, weighted by `h`: P h.
+    /// Covariances of all errors with the sum weighted by `h`: P h.
     pub fn along(&self, h: &[f64; N]) -> [f64; N] {
         let mut along = [0.0; N];
         for (j, (column, d)) in self.u.iter().zip(&self.d).enumerate() {
@@ -96,7 +97,7 @@ impl<const N: usize> Factors<N> {
         along
     }
 
-    /// Squared Mahalanobis distance e^T P^-1 e, chi-square with `N` degrees of freedom.
+    /// Squared Mahalanobis distance e^T P^-1 e, which is chi-square distributed with `N` degrees of freedom.
     ///
     /// Infinite if an error with zero variance is not zero.
     pub fn distance(&self, errors: &[f64; N]) -> f64 {
@@ -114,7 +115,7 @@ impl<const N: usize> Factors<N> {
         sum
     }
 
-    /// Solves P^-1 e by back substitution. Components with zero variance are ignored.
+    /// Computes P^-1 e by back substitution. Components with zero variance are ignored.
     pub fn solve(&self, errors: &[f64; N]) -> [f64; N] {
         let mut rest = *errors;
         for (j, column) in self.u.iter().enumerate().rev() {
@@ -137,7 +138,7 @@ impl<const N: usize> Factors<N> {
 
     /// Returns the factors of the covariance of a sum of independent, transformed errors.
     ///
-    /// Each part has a matrix, given by rows.
+    /// The rows of a matrix give the transformation of each part.
     ///
     /// Source: Thornton's modified weighted Gram-Schmidt, in Bierman 1977, VI.4.
     pub fn of_sum<const M: usize>(parts: [(&Self, &[[f64; N]; N]); M]) -> Self {
@@ -173,13 +174,13 @@ impl<const N: usize> Factors<N> {
         core::array::from_fn(|j| self.u.get(j).map_or(0.0, |column| dot(column, row, j + 1)))
     }
 
-    /// Returns the elements above the diagonal of U and those of D, column by column.
+    /// Returns the elements of U above the diagonal and those of D, column by column.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let columns = self.u.iter().zip(&self.d).enumerate();
         columns.flat_map(|(j, (column, d))| column.iter().take(j).copied().chain([*d]))
     }
 
-    /// Reads factors from such numbers; `None` if there are too few.
+    /// Creates factors from the numbers that [`Self::numbers`] returns; `None` if there are too few.
     pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
         let mut factors = Self::independent([0.0; N]);
         for (j, (column, d)) in factors.u.iter_mut().zip(&mut factors.d).enumerate() {
@@ -190,7 +191,7 @@ impl<const N: usize> Factors<N> {
         Some(factors)
     }
 
-    /// Fuses a measurement of the errors, weighted by `h`, with noise of a positive variance.
+    /// Fuses a measurement of the sum of errors weighted by `h`. The variance of its noise must be positive.
     ///
     /// Source: Bierman 1977, V.3.
     pub fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N> {
@@ -215,19 +216,19 @@ impl<const N: usize> Factors<N> {
         Gain { k: k.map(|k| k / variance), variance }
     }
 
-    /// Adds noise of a variance to the errors, weighted by `a`; entries of `a` from `len` on are zero.
+    /// Adds noise with this variance to all errors, weighted by `a`. Entries of `a` from `len` on are zero.
     pub fn add(&mut self, mut variance: f64, mut a: [f64; N], len: usize) {
         for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().take(len).rev() {
             enter(j, column, d, &mut variance, &mut a);
         }
     }
 
-    /// Adds noise of a variance to one error.
+    /// Adds noise with this variance to one error.
     pub fn add_to(&mut self, i: usize, variance: f64) {
         self.add_all([Noise::of_one(i, variance)]);
     }
 
-    /// Adds to the variances of the errors; entries that are not positive are ignored.
+    /// Adds to the variances of the errors. Additions that are not positive are ignored.
     pub fn widen(&mut self, variances: &[f64; N]) {
         for (i, variance) in variances.iter().enumerate().filter(|(_, variance)| **variance > 0.0) {
             self.add_to(i, *variance);
@@ -236,9 +237,9 @@ impl<const N: usize> Factors<N> {
 
     /// Adds several noises in order, interleaved column by column.
     ///
-    /// The result is bit-identical to adding them one after the other, because each depends on the earlier ones only
-    /// through the current column. Interleaving is faster: while one noise waits for the quotient that its next
-    /// column needs, the processor works on the others.
+    /// The result is bit-identical to adding the noises one after the other, because each noise depends on earlier
+    /// noises only through the current column. Interleaving is faster: while one noise waits for the quotient that
+    /// its next column needs, the processor works on the other noises.
     pub fn add_all<const M: usize>(&mut self, noises: [Noise; M]) {
         let mut variances = noises.map(|noise| noise.variance);
         let lens = noises.map(|noise| noise.weights[0].0 + 1);
@@ -257,7 +258,7 @@ impl<const N: usize> Factors<N> {
 
     /// Replaces the errors e by F e, where F is unit upper triangular.
     ///
-    /// `transform` works on one vector of errors; its entries from the given index on are zero.
+    /// `transform` changes one vector of errors in place. Its entries from the given index on are zero.
     pub fn shear(&mut self, transform: impl Fn(&mut [f64; N], usize)) {
         for (j, column) in self.u.iter_mut().enumerate() {
             transform(column, j + 1);
@@ -295,12 +296,12 @@ impl Noise {
         Self { variance: self.variance * factor, ..self }
     }
 
-    /// Creates noise of a variance in one error.
+    /// Creates noise of one error, with this variance.
     pub fn of_one(i: usize, variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0); 2] }
     }
 
-    /// Creates noise of a variance in one error, coupled by `share` into an error with a lower index.
+    /// Creates noise of one error, with this variance, that also acts by `share` on an error with a lower index.
     pub fn of_two(i: usize, (before, share): (usize, f64), variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0), (before, share)] }
     }
@@ -314,9 +315,9 @@ impl Noise {
     }
 }
 
-/// Adds noise to column `j` of the factors, after the columns above it.
+/// Adds noise to column `j` of the factors. Columns with a higher index come first.
 ///
-/// The remaining variance and weights apply to the columns below.
+/// Changes `variance` and `a` to the noise that remains for the columns with a lower index.
 ///
 /// Source: Agee and Turner 1972, in Bierman 1977, III.4.
 fn enter<const N: usize>(j: usize, column: &mut [f64; N], d: &mut f64, variance: &mut f64, a: &mut [f64; N]) {
@@ -337,7 +338,7 @@ fn at<const N: usize>(column: &[f64; N], i: usize) -> f64 {
     column.get(i).copied().unwrap_or(0.0)
 }
 
-/// Dot product of the first `len` elements, in four sums of fixed order.
+/// Dot product of the first `len` elements, in four partial sums of fixed order.
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N], len: usize) -> f64 {
     let (a, b) = (a.get(..len).unwrap_or_default(), b.get(..len).unwrap_or_default());
     let mut sums = [0.0; 4];
@@ -356,7 +357,7 @@ fn dot<const N: usize>(a: &[f64; N], b: &[f64; N], len: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// The textbook form, one noise at a time.
+    /// The textbook form, which adds a single noise.
     fn add_alone(factors: &mut Factors<7>, noise: &Noise) {
         let (mut c, mut a) = (noise.variance, [0.0; 7]);
         noise.put(&mut a);

@@ -1,31 +1,29 @@
-//! Sums that detect a head with a tilted axis: one that is yawed or pitched on its mount.
+//! Sums that detect a head with a tilted axis, which is yawed or pitched on its mount.
 //!
-//! A beam that leans along the tunnel is longer in either direction, by about the square of the lean. So a head's own
-//! lean shows as an asymmetry. Its ranges are too long while the vehicle turns to one side, and too short while it
-//! turns to the other. A constant excess may as well be the wall's shape, and is eliminated. Derivation:
-//! `docs/why/navigation.md`, "Settings in doubt".
+//! The range of a beam that leans along the tunnel is longer, by about the square of the lean. If the head itself
+//! is tilted, its ranges are too long while the vehicle turns to one side, and too short while it turns to the
+//! other side. So a tilt shows as an asymmetry. A constant excess of the ranges may also come from the wall's
+//! shape, so it is eliminated. Derivation: `docs/why/navigation.md`, "Settings in doubt".
 
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{FEWEST_BLOCKS, POSE, SURE, dot, solved};
 use headrace_geometry::math;
 
-/// Minimum share of the weight after the constant part is eliminated.
+/// Minimum share of the weight that remains after the constant part is eliminated.
 ///
-/// Less means that the vehicle has not turned to and fro enough.
+/// If less remains, the vehicle has not turned to both sides enough.
 const LEAST_LEFT: f64 = 0.05;
 
-/// Minimum significance of the smallest reported tilt, in standard deviations by range noise.
+/// Minimum significance of the smallest reported tilt, in standard deviations caused by range noise.
 const SHOWS: f64 = 3.0;
 /// Largest tilt for which the linear model holds, radians.
 const MOST_RAD: f64 = 0.3;
 
-/// Number of sums.
-///
-/// They are pattern squared, pattern times derivative, derivative squared, and each with the residuals.
+/// Number of sums: pattern squared, pattern times derivative, derivative squared, and both times the residual.
 const SUMS: usize = 5;
 
-/// Sums of one head and axis within a spell, next to those of the vehicle's pose.
+/// Sums of one head and one axis within a spell, and their products with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltSums {
     pattern_by_pose: [f64; POSE],
@@ -33,7 +31,7 @@ pub(super) struct TiltSums {
     sums: [f64; SUMS],
 }
 
-/// The same over blocks after the vehicle's pose is eliminated, with their second moments.
+/// Sums over blocks after the vehicle's pose is eliminated, and their second moments.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltFit {
     blocks: u32,
@@ -42,7 +40,10 @@ pub(super) struct TiltFit {
 }
 
 impl TiltSums {
-    /// Adds a reading: its derivatives by pose, by the tilt, and by half of the tilt's square at zero lean.
+    /// Adds a reading.
+    ///
+    /// Inputs: derivatives of the range with respect to the pose, the tilt, and half of the squared tilt at zero
+    /// lean (`pattern`).
     pub(super) fn add(
         &mut self,
         by_pose: [f64; POSE],
@@ -71,7 +72,8 @@ impl TiltSums {
 
     /// Returns the sums after the pose is eliminated.
     ///
-    /// `residuals` are the sums of residuals by pose, and `factor` is the factor of the pose information.
+    /// `residuals` are the sums of residuals times pose. `factor` is the Cholesky factor of the information on the
+    /// pose.
     pub(super) fn freed(&self, residuals: [f64; POSE], factor: &[[f64; POSE]; POSE]) -> [f64; SUMS] {
         let [pattern, tilt, residuals] =
             [self.pattern_by_pose, self.tilt_by_pose, residuals].map(|sums| solved(factor, sums));
@@ -107,7 +109,7 @@ impl TiltFit {
         }
     }
 
-    /// Returns the tilt, radians, and its weight, without the constant part.
+    /// Returns the tilt, radians, and its weight after the constant part is eliminated.
     ///
     /// `None` if the vehicle has not turned enough.
     fn estimate(&self) -> Option<(f64, f64)> {
@@ -120,10 +122,11 @@ impl TiltFit {
         (weight > LEAST_LEFT * tilt_2).then(|| ((tilt_off - share * pattern_off) / weight, weight))
     }
 
-    /// Returns the tilt if it certainly exceeds `least_rad`, and its distance from zero in standard deviations.
+    /// Returns the tilt and its distance from zero in standard deviations, if it certainly exceeds `least_rad`.
     ///
-    /// The standard deviation is the scatter of blocks, at least that of range noise at the observed `level` of the
-    /// declared variance. `None` if declared noise would hide such a tilt, or if the residuals show more than a tilt.
+    /// The standard deviation comes from the scatter of blocks. It is at least that of the range noise, whose
+    /// variance is `level` times the declared one. `None` if declared noise would hide a tilt of `least_rad`, or if
+    /// the tilt is too large for the linear model.
     pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
         let (tilt_rad, weight) = self.estimate()?;
         if weight * least_rad * least_rad < SHOWS * SHOWS {
@@ -132,7 +135,7 @@ impl TiltFit {
         let [pattern_2, both, _, pattern_off, _] = self.sums;
         let share = both / pattern_2;
         let steady = (pattern_off - tilt_rad * both) / pattern_2;
-        // Remainder of a block's sums, linear in them.
+        // Weights with which a block's sums add up to the remainder that the fit leaves.
         let left = [share * steady, share * tilt_rad - steady, -tilt_rad, -share, 1.0];
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.blocks);
@@ -141,7 +144,7 @@ impl TiltFit {
         ((least_rad..MOST_RAD).contains(&tilt_rad.abs()) && sure_sd >= SURE).then_some((tilt_rad, sure_sd))
     }
 
-    /// Sum of normalised squares that the tilt explains.
+    /// Returns the sum of normalised squares that the tilt explains.
     pub(super) fn explains(&self) -> f64 {
         self.estimate().map_or(0.0, |(tilt_rad, weight)| tilt_rad * tilt_rad * weight)
     }
@@ -153,8 +156,9 @@ mod tests {
 
     const NOISE_M: f64 = 0.01;
 
-    /// Readings of a head with `tilt_rad` on a wall that is off by `steady` of the pattern: pattern, derivative,
-    /// residual, by block.
+    /// Returns readings by block: pattern, derivative, residual. The head has the tilt `tilt_rad`.
+    ///
+    /// The wall differs from its design by `steady` times the pattern.
     fn blocks(tilt_rad: f64, steady: f64) -> Vec<Vec<[f64; 3]>> {
         let mut seed = 5_u64;
         let mut draw = || {
@@ -185,9 +189,9 @@ mod tests {
         fit
     }
 
-    /// Comparison with least squares over the readings themselves, for two unknowns by Cramer's rule.
+    /// The oracle is a least-squares fit to the readings themselves, for two unknowns by Cramer's rule.
     #[test]
-    fn tilt_equals_least_squares_with_the_certainty_of_its_blocks() {
+    fn tilt_and_certainty_equal_those_of_a_least_squares_fit() {
         let weight = 1.0 / (NOISE_M * NOISE_M);
         let square = |x: f64| x * x;
         for (tilt_rad, steady) in [(0.05, 0.02), (-0.08, -0.1), (0.2, 0.3)] {
@@ -198,7 +202,8 @@ mod tests {
             let whole = pp * tt - pt * pt;
             let (found_rad, found_steady) = ((pp * to - pt * po) / whole, (tt * po - pt * to) / whole);
             let fit = fit(&blocks);
-            // The tilt explains the difference between the squares left without it and with it.
+            // The tilt explains the difference between two sums of squares: left by a fit without a tilt, and by a
+            // fit with one.
             let left = |tilt: f64, steady: f64| sum(&|r| square(r[2] - tilt * r[1] - steady * r[0]));
             let explained = left(0.0, po / pp) - left(found_rad, found_steady);
             assert!((fit.explains() / explained - 1.0).abs() < 1e-6, "{} {explained}", fit.explains());
@@ -223,7 +228,7 @@ mod tests {
             None,
             "a tilt below the limit is not reported"
         );
-        // Certainty follows the scatter of ranges if that is below the declared one, but is limited by their noise.
+        // The certainty is limited by the range noise if that is large, and otherwise by the scatter of blocks.
         let sure_sd = |level: f64| fit(&blocks(0.05, 0.0)).certain(0.01, level).unwrap().1;
         assert!(
             (sure_sd(100.0) / sure_sd(400.0) - 2.0).abs() < 1e-9,

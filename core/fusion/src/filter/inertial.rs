@@ -1,4 +1,4 @@
-//! Inertial propagation of the estimate and of its errors.
+//! Inertial propagation of the estimate and its errors.
 //!
 //! Derivation: `docs/why/navigation.md`, "Propagation".
 
@@ -27,19 +27,19 @@ pub struct InertialSample {
 /// Number of values in the record of a leg.
 pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 2 + 2;
 
-/// Propagation accumulated since the errors were last propagated.
+/// Inertial motion accumulated since the errors were last propagated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
     dt_s: f64,
-    /// Integral of the rotation over times with gyro data.
+    /// Integral of the rotation matrix over times with gyro data.
     turned: Matrix3<f64>,
-    /// Integral and double integral of the rotation over times with accelerometer data.
+    /// Integral and double integral of the rotation matrix over times with accelerometer data.
     pushed: Matrix3<f64>,
     pushed_twice: Matrix3<f64>,
-    /// Velocity and displacement by specific force, without gravity.
+    /// Velocity and displacement caused by specific force, without gravity.
     velocity: Vector3<f64>,
     way: Vector3<f64>,
-    /// Effect of a gyro bias on velocity and displacement, by tilting the force.
+    /// Effect of a gyro bias on velocity and displacement: the bias tilts the force.
     tilting: Matrix3<f64>,
     tilting_twice: Matrix3<f64>,
     /// Time without gyro data, and without accelerometer data, s.
@@ -72,7 +72,7 @@ impl Default for Leg {
 }
 
 impl State {
-    /// Propagates the estimate over `dt_s`, and accumulates the effect on its errors in `leg`.
+    /// Propagates the estimate over `dt_s`. Adds the effect on its errors to `leg`.
     pub fn go_on(&mut self, felt: &InertialSample, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
         let from_m = self.position.x();
         let (turn, force) = self.move_on(felt, dt_s, gravity_mps2);
@@ -127,7 +127,7 @@ impl Leg {
         *without_force += if force.is_some() { 0.0 } else { dt_s };
     }
 
-    /// Process noise of the slack: two equal lags in series, driven by white noise.
+    /// Returns the process noise of the slack, which is two equal lags in series, driven by white noise.
     fn slack_noises(&self) -> [Noise; 2] {
         let slack = self.slack();
         let lags = self.dt_s / slack.time_s;
@@ -150,7 +150,7 @@ impl Leg {
         GaussMarkov { reach, time_s }
     }
 
-    /// Returns its values for a record.
+    /// Returns the values of the leg for a record.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
@@ -159,7 +159,7 @@ impl Leg {
         [self.dt_s].into_iter().chain(squares).chain(ways).chain(rest)
     }
 
-    /// Reads a leg from such values; `None` if there are too few.
+    /// Creates a leg from the values of a record; `None` if there are too few.
     pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
         let mut leg = Self { dt_s: numbers.next()?, ..Self::default() };
         let squares = [
@@ -179,25 +179,25 @@ impl Leg {
         Some(leg)
     }
 
-    /// Returns the leg with these noise factors and this slack.
+    /// Returns the leg with this noise and this slack.
     ///
-    /// The factors are for the process noise of gyro and accelerometer biases.
+    /// `unrest` contains the factors of the process noise of gyro and accelerometer biases.
     #[must_use]
     pub fn with_noise(self, unrest: [f64; 2], slack: GaussMarkov) -> Self {
         Self { unrest, slack: [slack.reach, slack.time_s], ..self }
     }
 
-    /// Its duration, s.
+    /// Duration of the leg, s.
     pub fn dt_s(&self) -> f64 {
         self.dt_s
     }
 
-    /// Whether inertial data were missing for any part of it.
+    /// Whether inertial data were missing in any part of the leg.
     pub fn is_blind(&self) -> bool {
         self.blind_s.iter().any(|blind_s| *blind_s > 0.0)
     }
 
-    /// Returns the transition of errors from its beginning to its end.
+    /// Returns the transition of errors from the beginning to the end of the leg.
     pub fn transition(&self, settings: &Settings) -> Transition {
         let fading = |time_s: f64| math::exp(-self.dt_s / time_s).max(LEAST_FADING);
         Transition {
@@ -234,8 +234,8 @@ impl Leg {
         let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
         for k in 0..3 {
             factors.add_all([
-                // White force noise over the leg: displacement correlated with velocity, plus an independent dt^2 /
-                // 12.
+                // White force noise over the leg causes a displacement that is correlated with velocity, plus an
+                // independent part with a variance factor of dt^2 / 12.
                 Noise::of_two(VELOCITY + k, (POSITION + k, self.dt_s / 2.0), force),
                 Noise::of_one(POSITION + k, force * self.dt_s * self.dt_s / 12.0),
                 Noise::of_one(ATTITUDE + k, rate),
@@ -272,7 +272,7 @@ impl Leg {
     }
 }
 
-/// Minimum decay factor, to avoid a division by zero. An error below it is negligible.
+/// Minimum decay factor, which avoids a division by zero. A smaller factor would leave a negligible error anyway.
 const LEAST_FADING: f64 = 1e-3;
 
 /// Transition of errors between two times: e' = F e.
@@ -288,12 +288,12 @@ pub struct Transition {
     way_turned: Matrix3<f64>,
     /// Distance along the tunnel, m, and the cable's scale error on it.
     creeping: [f64; 2],
-    /// Errors that decay, with their factors.
+    /// Indices of the errors that decay, each with its decay factor.
     fading: [(usize, f64); 9],
 }
 
 impl Transition {
-    /// Propagates the factors.
+    /// Propagates the covariance.
     pub fn carry(&self, factors: &mut Factors<ERRORS>) {
         factors.shear(|column, len| self.shear(column, len));
         for (i, fading) in self.fading {
@@ -315,7 +315,7 @@ impl Transition {
         self.fading.iter().find(|(i, _)| *i == error).map_or(1.0, |(_, left)| *left)
     }
 
-    /// Propagates errors.
+    /// Propagates one vector of errors.
     pub fn apply(&self, errors: &mut Errors) {
         self.shear(errors, ERRORS);
         for (i, fading) in self.fading {
@@ -325,7 +325,7 @@ impl Transition {
         }
     }
 
-    /// Applies the part without decay; errors from `len` on are zero.
+    /// Applies the transition without the decay. Errors from `len` on are zero.
     fn shear(&self, e: &mut Errors, len: usize) {
         if len <= VELOCITY {
             return;

@@ -1,4 +1,4 @@
-//! Measurement models: the value that the estimate predicts, and its derivative with respect to each error.
+//! Measurement models: the value that the estimate predicts, and its derivatives with respect to the errors.
 //!
 //! Derivation: `docs/why/navigation.md`, "Measurements".
 
@@ -12,7 +12,7 @@ use headrace_geometry::tunnel::Profile;
 
 /// Minimum cosine of the incidence at which a head's range may get more weight than declared.
 ///
-/// If the hull is pitched over the top, beams look along the tunnel, and few of them determine the attitude.
+/// If the hull is pitched steeply, the beams look along the tunnel, and only few of them determine the attitude.
 const SQUARE: f64 = 0.8;
 
 /// A scalar measurement.
@@ -20,27 +20,27 @@ const SQUARE: f64 = 0.8;
 pub struct ScalarUpdate {
     /// Change of the expected value per unit of each error.
     pub h: Errors,
-    /// Measured minus expected.
+    /// Measured value less expected value.
     pub residual: f64,
-    /// Variance of the measurement itself.
+    /// Variance of the measurement noise.
     pub noise: f64,
-    /// For a range, the beam's inclination along the tunnel.
+    /// Inclination of the beam along the tunnel; only for a range.
     pub lean: Option<Lean>,
     /// Second derivatives of the expected value, which the update neglects.
     ///
-    /// They are by position, 1/m, by rotation, m, and by both.
+    /// They are with respect to position, 1/m, to rotation, m, and to both.
     pub bends: [f64; 3],
 }
 
 /// Inclination of a beam along the tunnel.
 ///
-/// It lengthens the range in either direction. A filter that is uncertain of the direction would take its first guess
-/// as proven.
+/// An inclination to either side lengthens the range. So a filter that does not know the side would confirm its own
+/// first guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lean {
     /// Component of the beam along the tunnel.
     pub along: f64,
-    /// Its change per unit of each error.
+    /// Change of `along` per unit of each error.
     pub by: Errors,
     /// Change of the range per unit of `along`, divided by `along`, m.
     pub slope_m: f64,
@@ -68,7 +68,7 @@ impl ScalarUpdate {
         self
     }
 
-    /// Drops the dependence on the beam's inclination if it is not to be used or its direction is uncertain.
+    /// Removes the dependence on the beam's inclination if `is_used` is false or the direction is uncertain.
     ///
     /// `sd_of` returns the standard deviation of a weighted sum of errors.
     #[must_use]
@@ -85,18 +85,18 @@ impl ScalarUpdate {
         self
     }
 
-    /// Whether a beam meets the wall squarely. A range changes with the position by one over the cosine of the
+    /// Whether a beam meets the wall squarely. Per metre of position, the range changes by one over the cosine of
     /// incidence.
     pub fn is_square(&self) -> bool {
         vec::<Tunnel>(&self.h, POSITION).norm() < 1.0 / SQUARE
     }
 
-    /// Part of the residual that is due to the errors found since `known`.
+    /// Returns the part of the residual that comes from errors found since `known`.
     pub fn found(&self, known: &Errors, errors: &Errors) -> f64 {
         self.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
     }
 
-    /// Returns the update for the errors `later_s` after the measurement.
+    /// Returns the update with respect to the errors at a time `later_s` after the measurement.
     #[must_use]
     pub fn seen_later(mut self, later_s: f64) -> Self {
         for k in 0..3 {
@@ -111,11 +111,11 @@ impl ScalarUpdate {
 
 /// Minimum cosine of the incidence.
 ///
-/// Beams that graze the wall more measure its roughness rather than the position.
+/// The range of a beam at a more grazing angle shows the wall's roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
-/// Minimum distance assumed for the curvature of the wall, m.
+/// Minimum distance that is assumed for the curvature of the wall, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// Standard deviations from zero at which an inclination counts as certain.
+/// Standard deviations from zero above which an inclination counts as certain.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.
@@ -123,11 +123,11 @@ const SURE: f64 = 3.0;
 pub struct Beam {
     /// Position relative to the inertial unit, in the body's frame.
     pub offset: Vec3<Body>,
-    /// Direction of its axis.
+    /// Direction of the beam's axis.
     pub along: Vec3<Body>,
-    /// Angle from its axis within which the nearest part of the wall echoes first, radians.
+    /// Half angle of the cone around the axis in which the nearest part of the wall echoes first, radians.
     pub first_rad: f64,
-    /// Half beam width within which the first-echo model is uncertain, radians.
+    /// Half width of the beam in which it is uncertain which part of the wall echoes first, radians.
     pub unsure_rad: f64,
 }
 
@@ -144,7 +144,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     if cosine < LEAST_COSINE {
         return None;
     }
-    // The wall is a plane at `height_m`; the ray of the cone that is nearest to its normal echoes first.
+    // The wall is modelled as a plane at `height_m`. The ray of the cone that is nearest to the plane's normal
+    // echoes first.
     let height_m = hit.range_m * cosine;
     let incidence = math::acos(cosine);
     let nearest = (incidence - beam.first_rad).max(0.0);
@@ -152,17 +153,18 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     let stretch = 1.0 + state.range_scale;
     let designed_m = height_m / cos;
     let expected_m = designed_m * stretch;
-    // d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
+    // The slope is d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
-    // The range may be as short as the wider cone's nearest ray: mean square of a uniform distribution.
+    // The true range may be as short as the nearest ray of the wider cone. A uniform distribution in between is
+    // assumed.
     let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
     let mut by = [0.0; ERRORS];
     put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
     let across = 1.0 - along.x() * along.x();
-    // Curvature of a circular wall around the sonar, and of height / cos(incidence).
+    // The second derivatives are those of a circular wall around the sonar, and of height / cos(incidence).
     let secant = 1.0 / cosine;
     let by_turn = expected_m * (2.0 * secant * secant - 1.0);
     let tangent = math::sqrt((secant * secant - 1.0).max(0.0));
@@ -172,7 +174,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     Some(row.with_one(RANGES, designed_m))
 }
 
-/// Predicts the height of a pressure sensor at `offset` from the inertial unit, m above the tunnel floor.
+/// Predicts the height of a pressure sensor above the tunnel floor, m; `offset` is its position from the inertial
+/// unit.
 pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.z() + arm.z() + state.depth_offset_m;
@@ -182,7 +185,7 @@ pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> Sc
         .with_one(DEPTH, 1.0)
 }
 
-/// Predicts the chainage shown by the cable, whose end is at `offset` from the inertial unit.
+/// Predicts the chainage that the cable shows; `offset` is the position of the cable's end from the inertial unit.
 pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.x() + arm.x() + state.creep_m + state.slack_m;
@@ -193,10 +196,11 @@ pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -
         .with_one(SLACK, 1.0)
 }
 
-/// Predicts an attitude computed by a unit, about the tunnel's x, y and z. About z it is a compass with its
+/// Predicts an attitude computed by a unit, about the tunnel's x, y and z. About z, it is a compass with a
 /// deviation.
 ///
-/// The model compares rotations, not angles, so it is smooth at any attitude, including a pitch of 90 degrees.
+/// The model compares rotations instead of angles, so it is smooth at any attitude, including a pitch of 90
+/// degrees.
 pub fn attitude(
     state: &State,
     measured: Rot<Tunnel, Body>,
@@ -214,7 +218,8 @@ pub fn attitude(
     ]
 }
 
-/// Predicts the velocity over ground in the frame of a sensor at `offset`, m/s.
+/// Predicts the velocity over ground in the frame of a sensor, m/s; `offset` is its position from the inertial
+/// unit.
 ///
 /// `rate_radps` is the turn rate of the body.
 pub fn velocity(
@@ -237,7 +242,7 @@ pub fn velocity(
     })
 }
 
-/// Measures the gyro bias of a unit that does not turn by its mean rate, rad/s.
+/// Measures the gyro bias by the mean rate of a unit that does not turn, rad/s.
 pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarUpdate; 3] {
     let off = mean_radps + -state.rate_bias_radps;
     let off = [off.x(), off.y(), off.z()];
@@ -246,7 +251,7 @@ pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarU
     })
 }
 
-/// Zero-velocity update (ZUPT).
+/// Measures zero velocity (ZUPT).
 pub fn rest(state: &State, sd_mps: f64) -> [ScalarUpdate; 3] {
     let moved = [state.velocity_mps.x(), state.velocity_mps.y(), state.velocity_mps.z()];
     core::array::from_fn(|k| {
@@ -254,7 +259,7 @@ pub fn rest(state: &State, sd_mps: f64) -> [ScalarUpdate; 3] {
     })
 }
 
-/// Standard deviation of noise and rounding to a quantum.
+/// Returns the standard deviation of noise and of rounding to a quantum together.
 pub fn with_quantum(sd: f64, quantum: f64) -> f64 {
     math::hypot(sd, quantum / math::sqrt(12.0))
 }

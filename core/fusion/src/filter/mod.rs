@@ -65,23 +65,23 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
 
-/// Longest extrapolation of a fix beyond the last inertial sample.
+/// Maximum time by which a fix is extrapolated beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
-/// A clock that goes back by more than this has been reset.
+/// If the clock goes back by more than this, it has been reset.
 ///
-/// Readings stamped further in the future are rejected.
+/// Readings stamped further than this in the future are rejected.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
-/// Standard deviations beyond which the estimate is restarted: linearised updates would not converge.
+/// Standard deviations above which the estimate is restarted, because linearised updates would not converge.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
 /// Silence of all sensors after which the estimate is restarted.
 const SILENCE: DurNs = DurNs(5_000_000_000);
-/// Plausible limits of inertial samples; beyond them the unit is saturated or faulty.
+/// Limits of plausible inertial samples. If they are exceeded, the unit is saturated or faulty.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
-/// Capacity for estimates after the last epoch: the longest window plus epoch, 1.5 s, of a unit at 600 Hz.
+/// Capacity for estimates after the last epoch: a unit at 600 Hz over the longest window plus epoch, 1.5 s.
 const AHEAD: usize = 1024;
-/// Time between two passes of the heads while no head is known to turn.
+/// Assumed time between two passes of the heads if no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
 
 /// Navigation by the error-state Kalman filter.
@@ -89,8 +89,7 @@ pub struct FilterNavigation {
     context: Context,
     window: Window,
     sources: Vec<Option<Source>>,
-    /// Inertial unit used for propagation: the first one that delivered a reading. The estimate refers to its
-    /// position.
+    /// Inertial unit for propagation: the first unit that delivered a reading. The estimate refers to its position.
     unit: Option<usize>,
     listening: Listening,
     stillness: RestDetector,
@@ -98,16 +97,16 @@ pub struct FilterNavigation {
     zero: CounterZero,
     running: Eskf,
     is_running: bool,
-    /// Start of the first epoch; later epochs begin at multiples of the epoch length after it.
+    /// Start of the first epoch. Later epochs begin at whole multiples of the epoch length after it.
     epoch_zero: MonoNs,
     /// Latest receive time.
     received: MonoNs,
-    /// Estimates propagated from the last epoch.
+    /// Estimates after the last epoch, propagated by inertial samples.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// Covariance relative to an independent estimate of the same uncertainty.
+    /// Covariance relative to an independent estimate with the same uncertainty.
     revisit: Relative,
-    /// Number of restarts of the estimate, because it was lost or not finite, or because the clock went back.
+    /// Number of restarts of the estimate. Reasons: it was lost or not finite, or the clock went back.
     restarts: u64,
     journal: Option<Journal>,
 }
@@ -115,7 +114,7 @@ pub struct FilterNavigation {
 stateful!(FilterNavigation { state: context, window, unit, listening, stillness, raw_ways, zero, running, is_running, epoch_zero, received, standing, revisit, restarts; lists: ahead; slots: sources; fixed: journal; });
 
 impl FilterNavigation {
-    /// Creates it without readings.
+    /// Creates the navigation, without readings.
     pub fn new(profile: Profile, site: Site, settings: Settings) -> Self {
         Self {
             context: Context { profile, site, settings, unit_at: Vec3::zero() },
@@ -138,19 +137,19 @@ impl FilterNavigation {
         }
     }
 
-    /// Returns the estimate and its covariance; `None` before the first.
+    /// Returns the estimate and its covariance; `None` before the first estimate.
     pub fn running(&self) -> Option<&Eskf> {
         self.is_running.then_some(&self.running)
     }
 
-    /// Returns when the cable readings left the expected range, once that has lasted for a second.
+    /// Returns when the cable readings left the expected range, once the doubt about them has lasted for a second.
     ///
     /// `None` while the readings are trusted.
     pub fn cable_doubted_since(&self) -> Option<MonoNs> {
         self.cable_doubt().map(|doubt| doubt.since)
     }
 
-    /// Position of the inertial unit on the vehicle; the estimate refers to it.
+    /// Position of the inertial unit on the vehicle. The estimate refers to this position.
     pub fn unit_at(&self) -> Vec3<Body> {
         self.context.unit_at
     }
@@ -168,7 +167,7 @@ impl FilterNavigation {
         self
     }
 
-    /// Fuses every epoch that ended at or before `until`.
+    /// Fuses all epochs that ended at or before `until`.
     fn close_epochs(&mut self, until: MonoNs) {
         let last = self.epoch_before(until);
         if !self.is_running || self.running.at >= last {
@@ -176,7 +175,7 @@ impl FilterNavigation {
         }
         while self.running.at < last {
             let due = self.epoch_before(self.running.at + self.context.settings.epoch);
-            // An interval without readings is a single leg.
+            // A time span without readings is propagated as a single leg.
             let heard =
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
             let to = due.max(heard).min(last);
@@ -201,12 +200,12 @@ impl FilterNavigation {
         self.after_epochs();
     }
 
-    /// The filter's own doubt about the cable counter.
+    /// Returns the doubt about the cable counter that the filter itself has.
     fn dispute(&self) -> Option<CableDoubt> {
         self.running().and_then(|running| running.cable.doubt(running.at))
     }
 
-    /// Difference between the raw distances, as an error along the tunnel.
+    /// Returns the difference between the compared distances, as an error along the tunnel.
     fn raw_error(&self) -> Relative {
         Relative::along(self.raw_ways.doubt().map_or(0.0, |doubt| doubt.differs_m))
     }
@@ -224,7 +223,7 @@ impl FilterNavigation {
         }
     }
 
-    /// Records the end of the estimate.
+    /// Records that the estimate ends.
     fn write_end(&mut self) {
         if self.is_running && self.journal.is_some() {
             self.running.keep_end();
@@ -232,7 +231,7 @@ impl FilterNavigation {
         }
     }
 
-    /// Start of the epoch that contains a time.
+    /// Returns the start of the epoch that contains the time `at`.
     fn epoch_before(&self, at: MonoNs) -> MonoNs {
         let epoch_ns = self.context.settings.epoch.0.unsigned_abs().max(1);
         MonoNs(at.0 - at.0.saturating_sub(self.epoch_zero.0) % epoch_ns)
@@ -246,7 +245,7 @@ impl FilterNavigation {
         }
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
-        // At first, nothing relates new soundings to earlier ones.
+        // At first, errors of new soundings are independent of errors of earlier soundings.
         self.revisit = sd.independent();
         let differs = Relative::along(self.running.cable.differs_m());
         let relative = relative.unwrap_or(self.revisit).weighted(1.0, &differs, 1.0);
@@ -258,10 +257,11 @@ impl FilterNavigation {
         self.carry_ahead();
     }
 
-    /// Whether the chainage was reacquired since the heads last passed this place.
+    /// Whether the chainage was reacquired since the heads last passed this position, or the counter's zero is
+    /// lost.
     ///
-    /// Then the cable has slipped, and the offset between earlier and present soundings is unknown. This remains so
-    /// once the counter's zero is lost.
+    /// If so, the offset between earlier and present soundings is unknown. Once the zero is lost, this remains
+    /// true.
     fn has_jumped(&self) -> bool {
         if self.zero.is_lost() {
             return true;
@@ -270,9 +270,9 @@ impl FilterNavigation {
         self.running.way_sought.is_some_and(|then| self.running.at.since(then).0 <= longest.0)
     }
 
-    /// Starts a new alignment, because the last estimate is too far off for step-by-step correction.
+    /// Ends the estimate and starts a new alignment, because step-by-step correction would not converge.
     ///
-    /// Georeferenced samples remain. The chainage is kept until the next cable reading.
+    /// Georeferenced samples keep their positions. The chainage is kept until the next cable reading.
     fn begin_anew(&mut self, along_m: f64) {
         self.write_end();
         let x_m = self.running.state.position.x();
@@ -299,14 +299,15 @@ impl FilterNavigation {
         }
     }
 
-    /// Time over which errors accumulate between successive passes over a place.
+    /// Returns the time over which errors accumulate between two successive passes over the same position.
     fn pass_gap(&self) -> DurNs {
         self.between_passes(APART_SHARE)
     }
 
-    /// Time between two passes of evenly spread heads.
+    /// Returns the time between two passes of evenly spread heads.
     ///
-    /// Includes a share of the time until the rearmost head reaches the position of the foremost.
+    /// Includes the share `apart_share` of the time until the rearmost head reaches the position of the foremost
+    /// head.
     fn between_passes(&self, apart_share: f64) -> DurNs {
         let (mut passes_per_s, mut ahead_m, mut astern_m) = (0.0, f64::NEG_INFINITY, f64::INFINITY);
         for source in self.sources.iter().flatten() {
@@ -322,7 +323,7 @@ impl FilterNavigation {
         DurNs::from_secs_f64(error_time_s(passes_per_s, ahead_m - astern_m, speed_mps, apart_share))
     }
 
-    /// Adds a reading to the window, unless recent readings make it redundant.
+    /// Adds a reading to the window, unless recent readings of the same source make it redundant.
     fn take(&mut self, number: usize, at: MonoNs, reading: &Reading) {
         let step_rad = self.context.settings.return_step_rad;
         let Some(Some(source)) = self.sources.get_mut(number) else { return };
@@ -375,8 +376,8 @@ impl FilterNavigation {
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
-            // The clock was reset, or the previous timestamp was wrong. Waiting for the clock to catch up would be no
-            // better.
+            // The clock was reset, or the previous timestamp was wrong. To wait until the clock catches up would
+            // not be better.
             let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();

@@ -1,47 +1,48 @@
-//! Level of a source's white noise relative to the declared one, learnt from its innovations.
+//! Level of a source's white noise relative to the declared noise, learnt from innovations.
 //!
 //! The innovations of a correct filter are white. Their variance is then half the mean square of the difference
-//! between two of them. Slower errors of the estimate or a bias cancel in that difference. Derivation:
-//! `docs/why/navigation.md`, "Noise that is learnt".
+//! between two successive innovations. Biases and slow errors of the estimate cancel in that difference.
+//! Derivation: `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 use headrace_sensor::device::SensorKind;
 
-/// Change of the level's logarithm by a measurement whose normalised square is off by one.
+/// Change of the level's logarithm by a measurement whose normalised square exceeds its expected value by one.
 const GAIN: f64 = 0.01;
-/// Upper limit of the normalised square that counts, since one outlier is no noise.
+/// Limit at which normalised squares are clipped, because one outlier does not show the noise.
 const MOST: f64 = 9.0;
-/// Minimum share of a head's declared variance.
+/// Minimum share of a head's declared variance that may apply.
 ///
-/// Counts of 2 cm and noise of 1 cm leave this much of the 3 cm declared for a rough wall.
+/// The declared 3 cm suit a rough wall. A range step of 2 cm and noise of 1 cm alone amount to this share.
 const LEAST_OF_HEAD: f64 = 0.15;
-/// Upper limit of the square of a rejected innovation, as a share of the declared variance.
+/// Limit at which the square of a rejected innovation is clipped, as a share of the declared variance.
 ///
-/// Rocks and stray echoes are not the wall, and a wall that differs from its design causes many of them.
+/// Rejected innovations come from rocks and stray echoes. If the wall differs from its design, there are many of
+/// them.
 const MOST_UNUSED: f64 = 2.0;
-/// Number of measurements in the mean, and the minimum for a statement.
+/// Number of measurements in the mean, and the minimum number for a statement.
 const MEMORY: u32 = 200;
 const FEW: u32 = 30;
-/// Returns used in a turn of a head, one every three degrees. Fewer returns have not seen all of the wall.
+/// Number of used returns in a turn of a head, one every three degrees. Fewer returns do not cover the whole wall.
 const TURN: u32 = 120;
-/// Mean normalised square above which innovations are larger than noise explains.
+/// Mean normalised square above which the innovations are too large to be noise.
 const UNUSUAL: f64 = 1.8;
 
 /// Learnt noise level of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseLevel {
-    /// The last innovation of each scalar of a reading.
+    /// Last innovation of each scalar of a reading.
     last: [Option<f64>; 3],
     /// Factor of the declared variance.
     factor: f64,
-    /// Running mean of the normalised squares of all innovations, and their number.
+    /// Running mean of the normalised squares of all innovations, and the number of these innovations.
     nis: f64,
     seen: u32,
-    /// Running mean of the squares beyond the estimate's own uncertainty, as a share of the declared variance.
+    /// Running mean of squared innovations less the estimate's own variance, as a share of the declared variance.
     share: f64,
-    /// The same over the last few, to notice where the wall changes.
+    /// The same mean over the last few measurements, which shows changes of the wall.
     latest: f64,
 }
 
@@ -51,11 +52,11 @@ impl Default for NoiseLevel {
     }
 }
 
-/// Returns the limits of the level, as factors of the declared variance; `None` if it is not learnt.
+/// Returns the limits of the level, as factors of the declared variance; `None` if the level is not learnt.
 ///
-/// The declared tilt noise of an inertial unit covers its slow errors, which do not show in differences. The declared
-/// range noise of a head also covers bumps and shape of the wall, which a leaning beam would confuse with yaw.
-/// Differences only raise a head's level; it is lowered by the square of its total residual
+/// The declared tilt noise of an inertial unit covers its slow errors, which differences do not show. The declared
+/// range noise of a head also covers bumps and shape of the wall, which a leaning beam would confuse with yaw. So
+/// differences can only raise a head's level. The square of its total residual lowers it
 /// ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
@@ -69,7 +70,7 @@ fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
 }
 
 impl NoiseLevel {
-    /// Notes an innovation and its variance; `scalar` is the index within the reading.
+    /// Processes a used innovation and its variance; `scalar` is the index within the reading.
     pub fn note(&mut self, kind: SensorKind, scalar: usize, innovation: f64, variance: f64) {
         let Some(before) = self.last.get_mut(scalar).and_then(|last| last.replace(innovation)) else {
             return;
@@ -80,9 +81,9 @@ impl NoiseLevel {
         self.factor = (self.factor * math::exp(GAIN * (white - 1.0))).clamp(least, most);
     }
 
-    /// Notes the normalised square of any innovation, used or rejected.
+    /// Processes the normalised square of any innovation, whether used or rejected.
     ///
-    /// Returns it relative to the earlier mean if that mean is above its expected value.
+    /// Returns the square divided by the earlier mean, if this mean exceeds its expected value of 1.
     pub fn relative(&mut self, nis: f64) -> f64 {
         let usual = if self.seen >= FEW { self.nis.max(1.0) } else { 1.0 };
         self.seen = (self.seen + 1).min(MEMORY);
@@ -90,9 +91,7 @@ impl NoiseLevel {
         nis / usual
     }
 
-    /// Notes the square of an innovation beyond the estimate's own uncertainty.
-    ///
-    /// It is given as a share of the declared variance.
+    /// Processes a squared innovation less the estimate's own variance, as a share of the declared variance.
     pub fn note_share(&mut self, share: f64, is_used: bool) {
         let most = if is_used { MOST } else { MOST_UNUSED };
         let share = share.clamp(-most, most);
@@ -100,34 +99,34 @@ impl NoiseLevel {
         self.latest += (share - self.latest) / f64::from(self.seen.clamp(1, FEW));
     }
 
-    /// Recent share of its declared noise, 0 to 1; 1 until there are enough measurements.
+    /// Returns the recent share of the declared noise, 0 to 1; 1 until there are enough measurements.
     pub fn share(&self) -> f64 {
         if self.seen >= FEW { self.share.clamp(0.0, 1.0) } else { 1.0 }
     }
 
-    /// Whether innovations have about the expected size. Innovations of ranges are larger if the wall differs from
-    /// its design.
+    /// Whether innovations have about their expected size. Those of ranges are larger if the wall differs from its
+    /// design.
     pub fn is_usual(&self) -> bool {
         self.nis < UNUSUAL
     }
 
-    /// Notes that a measurement of this scalar was not used, because the next difference would span it.
+    /// Records that a measurement of this scalar was not used, so that no difference spans it.
     pub fn skip(&mut self, scalar: usize) {
         if let Some(last) = self.last.get_mut(scalar) {
             *last = None;
         }
     }
 
-    /// Factor of the declared variance; 1 if it is not learnt.
+    /// Returns the factor of the declared variance; 1 if the level is not learnt.
     pub fn factor(&self, kind: SensorKind, scalar: usize) -> f64 {
         limits(kind, scalar).map_or(1.0, |_| self.factor)
     }
 
-    /// Factor, at most 1, of the variance of a head's range that meets the wall squarely.
+    /// Returns the factor, at most 1, of the variance of a head's range that meets the wall squarely.
     ///
-    /// It is the share shown by such innovations once a turn of them is known, or by the last few if that is larger.
-    /// On a wall that differs from its design it is large, whether the wall is rough or bent. `None` for a head
-    /// without measurements.
+    /// It is the learnt share of the declared variance: over many measurements, or over the last few if that is
+    /// larger. It is 1 until there are measurements of a whole turn. It is large if the wall differs from its
+    /// design, by roughness or by shape. `None` for a head without measurements.
     pub fn smoothness(&self) -> Option<f64> {
         let is_known = self.seen >= TURN;
         (self.seen > 0)
@@ -141,7 +140,7 @@ mod tests {
 
     const HEAD: SensorKind = SensorKind::Head;
 
-    /// Level after `count` measurements of a head that are off by `off` of its declared standard deviation.
+    /// Returns the level after `count` measurements whose innovation is `off` declared standard deviations.
     fn level(count: u32, off: impl Fn(u32) -> f64, is_used: bool) -> NoiseLevel {
         let mut level = NoiseLevel::default();
         for k in 0..count {
@@ -171,21 +170,22 @@ mod tests {
             level(2000, |k| 0.5 * math::sqrt(2.0) * math::sin(f64::from(k)), true).smoothness().unwrap(),
             0.25,
         );
-        // It never falls below the part that counts and noise leave.
+        // The factor is never smaller than the share of range steps and noise.
         near(level(2000, alternating(0.01), true).smoothness().unwrap(), 0.15);
     }
 
-    /// On a wall that differs from its design, neighbouring ranges are off alike, so their differences show nothing.
+    /// If the wall differs from its design, neighbouring ranges have about equal errors, so their differences show
+    /// nothing.
     #[test]
-    fn wall_of_another_shape_is_not_smooth() {
+    fn wall_that_differs_in_shape_is_not_smooth() {
         near(level(2000, |_| 1.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |_| 3.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |k| math::sin(f64::from(k) / 40.0), true).smoothness().unwrap(), 0.5);
     }
 
-    /// Rejected innovations show that the wall differs; one stray echo in twenty hardly does.
+    /// Rejected innovations show that the wall differs from its design. One stray echo in twenty changes little.
     #[test]
-    fn rejected_innovations_count_a_little() {
+    fn rejected_innovations_have_limited_weight() {
         near(level(2000, |_| 9.0, false).share(), 1.0);
         let mut one = level(1000, alternating(0.5), true);
         for k in 0..200 {
@@ -194,7 +194,8 @@ mod tests {
         assert!((0.26..0.4).contains(&one.share()), "{}", one.share());
     }
 
-    /// The weight of a head that has become noisy falls below the declared one, and no other source counts as a head.
+    /// A head that has become noisy gets less weight than declared. A quiet source other than a head is not
+    /// affected.
     #[test]
     fn noisy_head_loses_weight_and_other_sources_learn_from_differences_only() {
         let noisy = level(4000, alternating(2.0), true);

@@ -1,4 +1,4 @@
-//! Standard deviations of an estimate's pose, and the limits for placing samples.
+//! Standard deviations of an estimate's pose, and the limits for georeferencing samples.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,27 +9,27 @@ use crate::relative::Relative;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// Limits for georeferencing: standard deviations of position in the section and of yaw, m and radians.
+/// Limits for georeferencing: standard deviations of the position in the section, m, and of yaw, radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
-/// The same for the chainage, relative to the previous pass of the heads and to the cable's length, m.
+/// Limit for the chainage, relative to the previous pass of the heads and absolute, m.
 const ALONG_LIMIT_M: f64 = 1.0;
 
 /// Standard deviations of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseSd {
-    /// Sd of the chainage, excluding the cable's scale, m.
+    /// Standard deviation of the chainage, without the part caused by the cable's scale, m.
     pub along_m: f64,
-    /// Sd of the position in the section, in the worse direction, m.
+    /// Standard deviation of the position in the section, in the less certain direction, m.
     pub place_m: f64,
-    /// Sd of roll or pitch, radians.
+    /// Standard deviation of roll or pitch, whichever is larger, radians.
     pub tilt_rad: f64,
-    /// Sd of yaw, radians.
+    /// Standard deviation of yaw, radians.
     pub yaw_rad: f64,
 }
 
 impl PoseSd {
-    /// Takes them from the covariance of an estimate's errors.
+    /// Computes the standard deviations from the covariance of an estimate's errors.
     pub fn of(factors: &Factors<ERRORS>) -> Self {
         let of = |i: usize| math::sqrt(factors.variance(i));
         let mut along = [0.0; ERRORS];
@@ -46,14 +46,14 @@ impl PoseSd {
         }
     }
 
-    /// Returns the covariance relative to an independent estimate of the same uncertainty.
+    /// Returns the covariance relative to an independent estimate with the same uncertainty.
     pub fn independent(&self) -> Relative {
         let variance = |sd: f64| 2.0 * sd * sd;
         let [along, tilt, yaw] = [self.along_m, self.tilt_rad, self.yaw_rad].map(variance);
         Relative::new([[along, 0.0, 0.0], [0.0, tilt, 0.0], [0.0, 0.0, yaw]])
     }
 
-    /// Checks whether this estimate and its relative covariance are good enough to georeference samples.
+    /// Returns `relative` if this estimate and `relative` are certain enough to georeference samples.
     ///
     /// Errors: the part that is too uncertain.
     pub fn standing(&self, relative: Relative) -> Result<Relative, NoFix> {
@@ -73,7 +73,7 @@ impl PoseSd {
 mod tests {
     use super::*;
 
-    /// Limits of docs/why/navigation.md: at 4 m, a yaw of 0.25 rad moves a sample by a metre.
+    /// The limits are stated in docs/why/navigation.md. At 4 m, a yaw of 0.25 rad moves a sample by a metre.
     #[test]
     fn too_uncertain_estimate_gives_no_fix() {
         let sure = PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 };

@@ -1,6 +1,6 @@
-//! Sums of a spell for all fitted parameters and the vehicle's pose.
+//! Sums of a spell for the vehicle's pose and all fitted parameters.
 //!
-//! The pose takes priority in explaining residuals.
+//! Only residuals that the pose does not explain count for the parameters.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,24 +9,24 @@ use super::head_tilt::TiltSums;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 
-/// Standard deviations of the pose within a spell, m and radians.
+/// Prior standard deviations of the pose within a spell, m and radians.
 const POSE_SD: [f64; POSE] = [0.3, 0.3, 0.005, 0.01, 0.02];
 
-/// Sums of a spell.
+/// Sums over the readings of a spell.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct PoseWindow {
     pub(super) begun: Option<MonoNs>,
-    /// Information on the pose, and its right-hand side.
+    /// Information matrix of the pose, and the right-hand side of its normal equations.
     pub(super) pose: [[f64; POSE]; POSE],
     pub(super) residuals: [f64; POSE],
     pub(super) scale: Line,
     pub(super) turned: [Line; FOLLOWED],
-    /// Sums for pitch and yaw of each head on its mount.
+    /// Sums for the pitch and yaw of each head on its mount.
     pub(super) tilted: [[TiltSums; 2]; FOLLOWED],
 }
 
 impl PoseWindow {
-    /// Adds a reading's information on the vehicle's pose.
+    /// Adds the information of a reading on the vehicle's pose.
     pub(super) fn add(&mut self, by_pose: [f64; POSE], residual_m: f64, weight: f64) {
         for ((by, line), sum) in by_pose.iter().zip(&mut self.pose).zip(&mut self.residuals) {
             for (part, other) in line.iter_mut().zip(&by_pose) {
@@ -36,7 +36,7 @@ impl PoseWindow {
         }
     }
 
-    /// Returns the lower Cholesky factor of the information on the pose, priors included.
+    /// Returns the lower Cholesky factor of the pose's information matrix, priors included.
     pub(super) fn factor(&self) -> Option<[[f64; POSE]; POSE]> {
         let mut factor = [[0.0; POSE]; POSE];
         for (i, (line, sd)) in self.pose.iter().zip(POSE_SD).enumerate() {
@@ -54,7 +54,7 @@ impl PoseWindow {
             .then_some(factor)
     }
 
-    /// Returns weight and weighted value of a parameter after the pose is eliminated.
+    /// Returns the weight and the weighted value of a parameter after the pose is eliminated.
     pub(super) fn freed(&self, line: &Line, factor: &[[f64; POSE]; POSE]) -> [f64; 2] {
         let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
         [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
@@ -65,8 +65,10 @@ impl PoseWindow {
 mod tests {
     use super::*;
 
-    /// Three readings have residuals of 1, 2 and 3 m from a parameter. The pose explains some of it, or all of it if
-    /// it acts alone.
+    /// Three readings with residuals of 1, 2 and 3 m are fitted by a parameter.
+    ///
+    /// In the first case, the pose has no effect on the parameter's fit. In the second case, both have the same
+    /// effect.
     #[test]
     fn residuals_that_the_pose_explains_are_removed() {
         let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };
@@ -80,7 +82,7 @@ mod tests {
         let freed = |spell: &PoseWindow, line: &Line| spell.freed(line, &spell.factor().unwrap());
         let alone = freed(&spell(1.0), &line([0.0; POSE]));
         assert!((alone[0] - 3.0).abs() < 1e-12 && (alone[1] - 6.0).abs() < 1e-12, "{alone:?}");
-        // The prior of the pose is 0.3 m: 3 readings against 11.1 of the prior leave a share of 1 - 3 / 14.1.
+        // Three readings have an information of 3, and the prior of 0.3 m has 11.1. The share 1 - 3 / 14.1 remains.
         let like_it = freed(&spell(1.0), &line([3.0, 0.0, 0.0, 0.0, 0.0]));
         let left = 1.0 - 3.0 / (3.0 + 1.0 / 0.09);
         assert!(

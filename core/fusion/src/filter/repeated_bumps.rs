@@ -1,48 +1,49 @@
 //! Weight of head returns from bumps that the heads have seen before.
 //!
-//! A stationary vehicle sees the same bumps in every turn. If each turn counted as new information, the estimate
-//! would become wrong and overconfident. Derivation: `docs/why/navigation.md`, "Bumps seen again".
+//! A stationary vehicle sees the same bumps in every turn of its heads. If each turn counted as new information,
+//! the estimate would become wrong and overconfident. Derivation: `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
 use super::settings::Settings;
 use headrace_geometry::math;
 
-/// Largest share of bumps in the noise of a return.
+/// Maximum share of the variance of a return that comes from bumps.
 const MOST_BUMPS: f64 = 0.9;
-/// Maximum number of passes that count.
+/// Limit for the number of passes.
 ///
-/// Repeated bumps must still hold an estimate that gyros alone would let drift.
+/// It is needed so that gyros alone do not let the estimate drift: returns from repeated bumps still hold it.
 const MOST_PASSES: f64 = 10.0;
 
-/// Number of times the heads have passed the present bumps.
+/// Counts how often the heads have passed the present bumps.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct RepeatedBumps {
-    /// Chainage at which they began to see these bumps, m.
+    /// Chainage at which the heads began to see these bumps, m.
     from_m: Option<f64>,
-    /// Returns of all heads since.
+    /// Number of returns of all heads since then.
     returns: u32,
 }
 
 impl RepeatedBumps {
-    /// Notes the position of the vehicle, m.
+    /// Updates the chainage of the vehicle, m.
     pub(super) fn pass(&mut self, x_m: f64, settings: &Settings) {
         if self.from_m.is_none_or(|from_m| (x_m - from_m).abs() >= settings.seen_again_m) {
             *self = Self { from_m: Some(x_m), returns: 0 };
         }
     }
 
-    /// Mean number of times a bump has been seen, including now, at least 1.
+    /// Returns the mean number of times that a bump has been seen, including now, at least 1.
     ///
-    /// In the turn under way, half of the bumps have been seen once more.
+    /// In an unfinished turn, half of the bumps have been seen once more.
     fn passes(&self, settings: &Settings) -> f64 {
         (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }
 
-    /// Counts a return and gives the variance with which to fuse it, m^2.
+    /// Counts a return, and returns the variance with which to fuse it, m^2.
     ///
-    /// `declared_m2` is its own variance, partly from bumps. n looks at one bump together have the weight of their
-    /// mean. Each gets the noise of its own contribution.
+    /// `declared_m2` is the variance of a single return, and `bumps` is the share of this variance that comes from
+    /// bumps. All returns from one bump together have the weight of their mean. Each return adds the part of that
+    /// weight that is new.
     pub(super) fn noise_m2(
         &mut self,
         range_m: f64,
@@ -53,7 +54,7 @@ impl RepeatedBumps {
         let passes = self.passes(settings);
         self.returns = self.returns.saturating_add(1);
         let step_m = settings.return_step_rad * range_m;
-        // Number of returns within one pass that see the bump.
+        // Number of returns from the same bump within one pass.
         let around = if step_m > 0.0 { (settings.bump_m / step_m).max(1.0) } else { 1.0 };
         let bumps_m2 = bumps.min(MOST_BUMPS) * declared_m2;
         let own_m2 = (declared_m2 - bumps_m2) / around;
@@ -67,7 +68,8 @@ mod tests {
 
     const DECLARED_M2: f64 = 9e-4;
 
-    /// Noise of a return after `passes`, at a range where `around` returns of a turn see one bump.
+    /// Returns the noise of a return after `passes` passes, at a range where `around` returns of a turn see the
+    /// same bump.
     fn noise_m2(passes: f64, around: f64, bumps: f64) -> f64 {
         let settings = Settings::default();
         let returns = math::round_to_i64((passes - 0.5) * math::TAU / settings.return_step_rad);
@@ -75,7 +77,7 @@ mod tests {
         seen.noise_m2(settings.bump_m / settings.return_step_rad / around, DECLARED_M2, bumps, &settings)
     }
 
-    /// Weighted as in least squares, returns that see one bump have the weight of their mean.
+    /// In a least-squares sum, all returns from one bump have the weight of their mean.
     #[test]
     fn returns_from_one_bump_have_the_weight_of_their_mean() {
         let bumps = 0.6;
@@ -94,11 +96,11 @@ mod tests {
     fn repeated_passes_count_fully_on_a_smooth_wall_and_hardly_on_a_rough_one() {
         assert!((noise_m2(9.0, 1.0, 0.0) - DECLARED_M2).abs() < 1e-15);
         assert!(noise_m2(9.0, 1.0, 1.0) > 100.0 * DECLARED_M2);
-        // After an hour at rest, repeated bumps still keep this small weight.
+        // Even after an hour at rest, returns from repeated bumps keep this small weight.
         assert!((noise_m2(1e6, 1.0, 1.0) - noise_m2(MOST_PASSES, 1.0, 1.0)).abs() < 1e-15);
     }
 
-    /// Passes accumulate while the vehicle is stationary, and restart a short distance ahead or astern.
+    /// Passes add up while the vehicle is stationary. The count restarts after a short motion ahead or astern.
     #[test]
     fn passes_accumulate_until_the_vehicle_moves_on() {
         let settings = Settings::default();
@@ -108,7 +110,7 @@ mod tests {
             (0..returns).for_each(|_| _ = seen.noise_m2(6.0, DECLARED_M2, 0.5, &settings));
             seen.passes(&settings)
         };
-        // 120 returns are one turn.
+        // A turn has 120 returns.
         let passes = [(0, 7.0), (120, 7.01), (240, 7.0), (60, 7.06), (0, 7.03), (0, 7.0)]
             .map(|(n, x_m)| after(n, x_m));
         for (found, right) in passes.iter().zip([1.0, 1.5, 3.5, 1.0, 1.0, 1.0]) {

@@ -1,8 +1,8 @@
-//! Roughness of the wall, learnt from echosounders that face each other.
+//! Roughness of the wall, learnt from echosounders that face opposite walls.
 //!
-//! The sum of their ranges does not depend on the vehicle's position between them. Its variation beyond their noise
-//! therefore comes from the wall. An echosounder sees one bump for seconds. Derivation: `docs/why/navigation.md`,
-//! "Bumps of the wall".
+//! The sum of two opposite ranges does not depend on the vehicle's position between the walls. So if the sum varies
+//! by more than its noise, the walls are rough. An echosounder sees the same bump for seconds. Derivation:
+//! `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
@@ -10,20 +10,20 @@ use super::settings::Settings;
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of bumps in the mean, and the number of bumps that the declared noise counts as.
+/// Number of bumps in the mean, and the number of bumps for which the declared noise counts.
 const MEMORY: f64 = 30.0;
 const DECLARED: f64 = 1.0;
-/// Upper limit of the square of a sum, as a factor of its variance, since one outlier is no bump.
+/// Limit at which the square of a sum is clipped, as a factor of its variance, because one outlier is no bump.
 const MOST: f64 = 9.0;
-/// Upper limit of the variance, as a factor of the declared one: 6 cm.
+/// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to 6 cm.
 const ROUGHEST: f64 = 4.0;
-/// Minimum speed past bumps, m/s: a slower vehicle drifts sideways at about this speed.
+/// Minimum speed along the wall that is assumed, m/s. A slower vehicle drifts sideways at about this speed.
 const STILL_MPS: f64 = 0.05;
-/// Number of echosounders whose last looks are kept.
+/// Number of echosounders whose last pings are kept.
 const ECHOSOUNDERS: usize = 8;
-/// Maximum cosine between the range gradients of two echosounders that face each other.
+/// Maximum cosine between the range gradients of two echosounders that face opposite walls.
 const FACING: f64 = -0.95;
-/// Maximum time between their looks, s.
+/// Maximum time between two pings that form a sum, s.
 const AT_ONCE_S: f64 = 0.25;
 
 /// A fused ping.
@@ -33,19 +33,19 @@ pub(super) struct Look {
     pub(super) source: usize,
     /// Time of the ping.
     pub(super) at: MonoNs,
-    /// Change of the expected range per metre of position.
+    /// Change of the expected range per metre of the vehicle's position.
     pub(super) by_place: Vec3<Tunnel>,
-    /// Residual of the range after the correction, m.
+    /// Residual of the range after the correction by the ping, m.
     pub(super) left_m: f64,
-    /// Variance of its white noise, m^2.
+    /// Variance of the white noise of the range, m^2.
     pub(super) white_m2: f64,
 }
 
-/// Variance of the wall's bumps as echosounders see them, as a factor of their declared one.
+/// Variance of the bumps that echosounders see, as a factor of the declared variance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Roughness {
     factor: f64,
-    /// Bumps seen, as far as they count.
+    /// Number of bumps seen so far, up to the limit of the mean.
     seen: f64,
     looks: [Option<Look>; ECHOSOUNDERS],
 }
@@ -58,10 +58,10 @@ impl Default for Roughness {
 }
 
 impl Roughness {
-    /// Notes a ping that has corrected the estimate.
+    /// Processes a ping that has corrected the estimate.
     ///
-    /// `bump` is the share of a bump that the ping adds. `scale_m2` is the variance that the unknown scale of ranges
-    /// gives a sum of two.
+    /// `bump` is the share of a bump that the ping adds. `scale_m2` is the variance of a sum of two ranges that the
+    /// unknown scale of ranges causes.
     pub(super) fn note(&mut self, look: Look, bump: f64, scale_m2: f64, settings: &Settings) {
         let faces = |other: &&Look| {
             other.by_place.dot(&look.by_place) < FACING
@@ -72,7 +72,8 @@ impl Roughness {
             let noise_m2 = look.white_m2 + other.white_m2 + scale_m2;
             let sum_m = look.left_m + other.left_m;
             let most_m2 = MOST * (noise_m2 + 2.0 * self.variance_m2(settings).max(declared_m2));
-            // Each echosounder sees its own bump, and each of the two counts the pair.
+            // The sum contains the bumps of both echosounders. Each pair of bumps is counted twice, once by each
+            // echosounder.
             let found_m2 = ((sum_m * sum_m).min(most_m2) - noise_m2) / 2.0;
             let share = bump / 2.0;
             self.seen = (self.seen + share).min(MEMORY);
@@ -92,14 +93,15 @@ impl Roughness {
 
     /// Returns how many pings of this echosounder see the same bump at this speed, at least 1.
     ///
-    /// Together they give no more information on the position than a single ping. The result is 1 for the first ping.
+    /// Together these pings give no more information on the position than a single ping. For a first ping, returns
+    /// 1.
     pub(super) fn looks_at_a_bump(&self, source: usize, at: MonoNs, speed_mps: f64, bump_m: f64) -> f64 {
         let before = self.looks.iter().flatten().find(|look| look.source == source);
         before.map_or(1.0, |before| looks(at.since(before.at), speed_mps, bump_m))
     }
 }
 
-/// Number of pings at the interval `apart` that see the same bump at this speed.
+/// Returns how many pings see the same bump at this speed; `apart` is the time between pings.
 fn looks(apart: DurNs, speed_mps: f64, bump_m: f64) -> f64 {
     let way_m = apart.as_secs_f64().abs() * speed_mps.abs().max(STILL_MPS);
     if way_m > 0.0 { (bump_m / way_m).max(1.0) } else { 1.0 }
@@ -110,13 +112,14 @@ mod tests {
     use super::*;
     use headrace_geometry::math;
 
-    /// Heights of bumps a third of a metre long, with this standard deviation.
+    /// Height of bumps with a length of a third of a metre and this standard deviation, m.
     fn height_m(side: f64, along_m: f64, sd_m: f64) -> f64 {
         sd_m * (math::sin((19.0 + 2.0 * side) * along_m) + math::sin((31.7 + 4.0 * side) * along_m))
     }
 
-    /// Roughness found after a time with two opposite echosounders at 0.1 m/s, while the vehicle sways between the
-    /// walls.
+    /// Returns the roughness found by two opposite echosounders in a drive at 0.1 m/s, m.
+    ///
+    /// The vehicle sways between the walls.
     fn found_m(rough_m: f64, white_m: f64, scale_m2: f64, end_s: f64) -> f64 {
         let settings = Settings::default();
         let mut roughness = Roughness::default();
@@ -137,10 +140,10 @@ mod tests {
         math::sqrt(roughness.variance_m2(&settings))
     }
 
-    /// The wall's roughness is found whatever the vehicle's motion. A smooth wall is found smooth even if declared
+    /// The roughness is found although the vehicle sways. A smooth wall is recognised even if it is declared as
     /// rough.
     #[test]
-    fn roughness_is_the_excess_of_the_range_sum_over_its_noise() {
+    fn roughness_equals_the_excess_variation_of_the_range_sum() {
         for rough_m in [0.0, 0.01, 0.03, 0.05] {
             for white_m in [0.0, 0.02] {
                 let found_m = found_m(rough_m, white_m, 0.0, 400.0);
@@ -149,7 +152,7 @@ mod tests {
         }
     }
 
-    /// Nothing is learnt while the scale of ranges is unknown, from one echosounder, or from two that look the same
+    /// Nothing is learnt while the scale of ranges is unknown, from one echosounder, or from two that face the same
     /// way.
     ///
     /// The learnt roughness is at most twice the declared one.
@@ -168,12 +171,12 @@ mod tests {
     }
 
     #[test]
-    fn looks_at_a_bump_are_the_pings_along_its_length() {
+    fn pings_per_bump_follow_from_speed_and_bump_length() {
         let looks = |apart_s: f64, speed_mps: f64| looks(DurNs::from_secs_f64(apart_s), speed_mps, 0.1);
         assert!((looks(0.1, 0.2) - 5.0).abs() < 1e-9);
         assert!((looks(0.1, -0.2) - 5.0).abs() < 1e-9 && (looks(-0.1, 0.2) - 5.0).abs() < 1e-9);
-        // A nearly stationary vehicle still sways. Pings farther apart than a bump are independent, and simultaneous
-        // ones count as one.
+        // A nearly stationary vehicle still sways. Pings farther apart than a bump count as one each, and so do
+        // simultaneous pings.
         assert!((looks(0.1, 0.0) - 20.0).abs() < 1e-9);
         assert_eq!((looks(1.0, 0.2), looks(0.0, 0.2)), (1.0, 1.0));
     }

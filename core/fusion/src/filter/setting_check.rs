@@ -1,10 +1,9 @@
-//! Detection of wrong settings by fits to the residuals of ranges against the design.
+//! Detection of wrong settings from the residuals of ranges against the design.
 //!
-//! Each setting is one parameter.
-//!
-//! Within a spell of a few seconds, the vehicle's position and attitude absorb what they can. The parameters are
-//! fitted to the rest. Spells add up to blocks of distance. Blocks are about as independent as the wall allows, and
-//! their scatter gives the uncertainty of a figure. Derivation: `docs/why/navigation.md`, "Settings in doubt".
+//! Each setting is a parameter that is fitted to the residuals. Within a spell of a few seconds, the vehicle's pose
+//! explains as much of the residuals as it can, and the parameters explain the rest. The sums of spells are added
+//! up over blocks of distance. Blocks are about as independent as the wall allows, so their scatter gives the
+//! uncertainty of a parameter. Derivation: `docs/why/navigation.md`, "Settings in doubt".
 
 use serde::{Deserialize, Serialize};
 
@@ -25,25 +24,26 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Length of a spell: about as long as a filter with wrong ranges keeps its position.
+/// Length of a spell: about the time for which a filter with wrong ranges keeps its position.
 const SPELL: DurNs = DurNs(2_000_000_000);
-/// Minimum length of a block, in time and distance. A block with hardly any motion is dropped after the maximum time.
+/// Minimum duration and distance of a block, and the maximum duration. A block that is too short by then is
+/// dropped.
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
 /// Minimum number of readings in a block.
 const FEWEST_READINGS: u32 = 100;
-/// Smallest reported figures: a share of the range, and an angle.
+/// Smallest values that are reported: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ANGLE_RAD: f64 = 0.03;
-/// Residual above which a range loses weight, and above which it does not count, m.
+/// Residual above which a range loses weight, and residual above which it is ignored, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
-/// Number of alternatives for the followed sources.
+/// Maximum number of pairs of a source and another mount.
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
-/// Mean square residual of an echosounder that does not fit at all, m^2.
+/// Mean square residual above which an echosounder counts as wrong, m^2.
 ///
-/// It pulls the estimate away and makes heads look turned.
+/// Such an echosounder pulls the estimate away and makes correct heads look turned.
 const ASTRAY_M2: f64 = 0.04;
 
 /// A setting that is likely wrong.
@@ -51,35 +51,35 @@ const ASTRAY_M2: f64 = 0.04;
 pub enum Setting {
     /// Ranges are too long by this share.
     ///
-    /// The speed of sound is set too high, or the wall is wider than drawn by this share.
+    /// Either the speed of sound is set too high, or the wall is wider than in the design by this share.
     RangeScale(f64),
-    /// A head is rotated about its axis by this angle from its configured mount, radians.
+    /// A head is rotated about its axis relative to its configured mount, by this angle in radians.
     ///
-    /// The angle is to be added to its roll.
+    /// The angle is to be added to the configured roll.
     HeadTurned(f64),
-    /// A head is pitched on its mount by this angle, radians, to be added to its pitch.
+    /// A head is pitched on its mount by this angle, radians, which is to be added to the configured pitch.
     HeadPitched(f64),
-    /// A head is yawed on its mount by this angle, radians, to be added to its yaw.
+    /// A head is yawed on its mount by this angle, radians, which is to be added to the configured yaw.
     HeadYawed(f64),
-    /// A source faces the opposite way.
+    /// A source faces the opposite direction.
     WrongWayRound,
-    /// Two sources are swapped; the value is the number of the other one.
+    /// Two sources are swapped; the value is the number of the second source.
     Swapped(u16),
 }
 
-/// A setting in doubt.
+/// A setting that is likely wrong, with its source and certainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SettingDoubt {
     /// The setting that is likely wrong.
     pub setting: Setting,
     /// Number of the source, if the setting belongs to one source.
     pub source: Option<u16>,
-    /// Standard deviations from the configured value.
+    /// Distance from the configured value, in standard deviations.
     pub sure_sd: f64,
 }
 
 impl Setting {
-    /// The word for it in reports and logs.
+    /// Name of the setting in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::RangeScale(_) => "range_scale",
@@ -91,7 +91,7 @@ impl Setting {
         }
     }
 
-    /// Returns the share or the angle, radians; 0 if there is none.
+    /// Returns the value of the setting, a share or an angle in radians; 0 if it has none.
     pub fn figure(self) -> f64 {
         match self {
             Self::RangeScale(figure)
@@ -102,7 +102,7 @@ impl Setting {
         }
     }
 
-    /// Returns the angle by which a head differs from its configured mount, radians.
+    /// Returns the angle by which a head differs from its configured mount, radians; `None` for other settings.
     pub fn angle_rad(self) -> Option<f64> {
         match self {
             Self::HeadTurned(by_rad) | Self::HeadPitched(by_rad) | Self::HeadYawed(by_rad) => Some(by_rad),
@@ -110,7 +110,7 @@ impl Setting {
         }
     }
 
-    /// Returns the other one of two swapped sources.
+    /// Returns the number of the second of two swapped sources; `None` for other settings.
     pub fn other(self) -> Option<u16> {
         match self {
             Self::Swapped(other) => Some(other),
@@ -120,7 +120,7 @@ impl Setting {
 }
 
 impl SettingDoubt {
-    /// Whether it concerns the same setting, whatever the figure.
+    /// Whether both doubts concern the same setting, with equal or different values.
     pub fn is_of_same(&self, other: &Self) -> bool {
         self.source == other.source
             && self.setting.as_str() == other.setting.as_str()
@@ -128,12 +128,12 @@ impl SettingDoubt {
     }
 }
 
-/// Reference for ranges.
+/// Context for the prediction of ranges.
 #[derive(Debug, Clone, Copy)]
 pub struct Design<'a> {
     /// Design profile.
     pub profile: &'a Profile,
-    /// Water.
+    /// Water and location of the tunnel.
     pub site: &'a Site,
     /// Noise settings of the sensors.
     pub settings: &'a Settings,
@@ -141,16 +141,16 @@ pub struct Design<'a> {
     pub unit_at: Vec3<Body>,
 }
 
-/// A range reading compared with the design.
+/// A measured range with its beam, to be compared with the design.
 struct Look {
     beam: Beam,
     range_m: f64,
     sd_m: f64,
 }
 
-/// A block: its start, its readings, and the sums of its spells.
+/// A block: its start, its number of readings, and the sums of its spells.
 ///
-/// The vehicle's pose is eliminated from the sums.
+/// The vehicle's pose is already eliminated from the sums.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Block {
     begun: Option<(MonoNs, f64)>,
@@ -160,7 +160,7 @@ struct Block {
     tilted: [[[f64; 5]; 2]; FOLLOWED],
 }
 
-/// Sums for all settings that are judged.
+/// Fits of all settings that are checked.
 #[derive(Debug, Clone)]
 pub struct SettingChecks {
     block: Block,
@@ -170,7 +170,7 @@ pub struct SettingChecks {
     turned: [Fit; FOLLOWED],
     tilted: [[TiltFit; 2]; FOLLOWED],
     alternatives: Vec<Alternative>,
-    /// Number of readings of each followed source, and its observed share of the declared variance, at most 1.
+    /// For each followed source, the number of readings and the observed share of the declared variance, at most 1.
     heard: [u32; FOLLOWED],
     levels: [f64; FOLLOWED],
     doubt: Option<SettingDoubt>,
@@ -197,10 +197,10 @@ impl Default for SettingChecks {
 }
 
 impl SettingChecks {
-    /// Returns the most likely of the settings that are certainly wrong.
+    /// Returns the setting that explains the residuals best, among those that are certainly wrong.
     ///
-    /// Inputs: the estimate's scale of all ranges and its standard deviation, whose effect is no longer part of the
-    /// residuals.
+    /// Inputs: the estimated scale of all ranges and its standard deviation. The residuals no longer contain the
+    /// effect of this estimated scale.
     pub fn doubt(&self, [share, sd]: [f64; 2]) -> Option<SettingDoubt> {
         let sure_sd = share.abs() / sd.max(f64::MIN_POSITIVE);
         let is_scaled = self.scale.is_settled() && share.abs() >= LEAST_SCALE && sure_sd >= SURE;
@@ -208,7 +208,7 @@ impl SettingChecks {
         self.doubt.or_else(|| is_scaled.then_some(SettingDoubt { setting, source: None, sure_sd }))
     }
 
-    /// Processes a reading before it is fused, with the estimate at its time.
+    /// Processes a reading before it is fused; `state` is the estimate at the time of the reading.
     ///
     /// Allocates: never.
     pub fn hear(
@@ -252,7 +252,7 @@ impl SettingChecks {
         let own_turn = turn + -arm.cross(&place);
         let expected_m = look.range_m - row.residual;
         let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
-        // A known scale error makes no range an outlier.
+        // A known scale error makes no range an outlier: the smaller of the residuals with and without it counts.
         let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
         let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
         let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
@@ -276,7 +276,7 @@ impl SettingChecks {
         }
     }
 
-    /// Index of a source among the followed ones.
+    /// Returns the index of a source among the followed sources; adds the source if there is room.
     fn slot(&mut self, source: usize) -> Option<usize> {
         let source = u16::try_from(source).ok()?;
         let place = self.followed.iter().position(|known| known.is_none_or(|known| known == source))?;
@@ -284,9 +284,9 @@ impl SettingChecks {
         Some(place)
     }
 
-    /// Compares a reading with the predictions for other mounts.
+    /// Compares a reading with predictions for other mounts.
     ///
-    /// These are the mounts of other sources of its kind, and its own mount turned round.
+    /// These are the mounts of other sources of the same kind, and the source's own mount turned by half a turn.
     fn compare(
         &mut self,
         state: &State,
@@ -344,7 +344,7 @@ impl SettingChecks {
         }
     }
 
-    /// Ends a block.
+    /// Ends a block, and adds its sums to the fits.
     fn close(&mut self) {
         self.end_spell();
         if self.block.readings >= FEWEST_READINGS {
@@ -418,19 +418,19 @@ fn info(sources: &[Option<Source>], number: usize) -> Option<&SensorInfo> {
     sources.get(number)?.as_ref().map(|source| &source.sensor)
 }
 
-/// Axes about which a mount is pitched and yawed, in the body frame.
+/// Returns the axes about which a mount is pitched and yawed, in the body frame.
 fn tilt_axes(mount: &Rot<Body, Sensor>) -> [Vec3<Body>; 2] {
     let ahead = *mount * Vec3::<Sensor>::new(1.0, 0.0, 0.0);
     let level = math::hypot(ahead.x(), ahead.y()).max(f64::MIN_POSITIVE);
     [Vec3::new(-ahead.y() / level, ahead.x() / level, 0.0), Vec3::new(0.0, 0.0, 1.0)]
 }
 
-/// Half a turn about the sensor's own vertical axis.
+/// Returns half a turn about the sensor's own vertical axis.
 fn round() -> Rot<Sensor, Sensor> {
     Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
 }
 
-/// Interprets a reading of a source with this mount; `None` without a range.
+/// Interprets a reading of a source with this mount; `None` if the reading has no range.
 fn look(info: &SensorInfo, design: &Design<'_>, reading: &Reading) -> Option<Look> {
     let Design { site, settings, unit_at, .. } = design;
     let (along, range_m, first_rad, unsure_rad, sd_m) = match (info.kind, reading) {

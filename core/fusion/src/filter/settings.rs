@@ -1,6 +1,6 @@
 //! Noise settings of the sensors.
 //!
-//! Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table overrides them.
+//! The defaults suit a small vehicle with a MEMS unit. The `[navigation]` table of a vehicle file overrides them.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use headrace_sensor::device::{BiasSpec, InertialNoise, SensorKind};
 
 /// One degree in radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// A Gauss-Markov process about zero.
+/// A Gauss-Markov process with zero mean.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GaussMarkov {
     /// Standard deviation, in the unit of the process.
@@ -20,15 +20,15 @@ pub struct GaussMarkov {
 }
 
 impl GaussMarkov {
-    /// Creates the process of a bias with a constant and a wandering part.
+    /// Creates the process of a bias that has a constant part and a drifting part.
     ///
-    /// Its variance is the sum of both, and its correlation time is that of the wandering part.
+    /// The variance is the sum of both parts, and the process gains variance as fast as the drifting part.
     pub fn of_bias(bias: &BiasSpec) -> Self {
         let variance = bias.turn_on * bias.turn_on + bias.in_run * bias.in_run;
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
     }
 
-    /// Variance that a process of one lag gains per second.
+    /// Variance that a process with a single lag gains per second.
     pub fn density(&self) -> f64 {
         2.0 * self.reach * self.reach / self.time_s
     }
@@ -48,7 +48,8 @@ pub struct Settings {
     pub rate_noise: f64,
     /// White noise of the accelerometers, m/s^2/sqrt(Hz).
     pub force_noise: f64,
-    /// The same without gyro or accelerometer data: the vehicle's own turning and acceleration.
+    /// White noise without gyro or accelerometer data: the vehicle's own turning and acceleration, in the same
+    /// units.
     pub blind_rate_noise: f64,
     /// See `blind_rate_noise`.
     pub blind_force_noise: f64,
@@ -56,67 +57,67 @@ pub struct Settings {
     pub rate_bias: GaussMarkov,
     /// Bias of the accelerometers, m/s^2.
     pub force_bias: GaussMarkov,
-    /// Noise of a tether counter, its quantum excluded, m.
+    /// Noise of a tether counter without the rounding to its step, m.
     pub tether_sd_m: f64,
-    /// Slack of the cable, m, a smooth process (two lags in series). The default suits periods of 16 s.
+    /// Slack of the cable, m: a smooth process of two lags in series. The default suits slack with periods of 16 s.
     pub slack: GaussMarkov,
     /// Initial scale error of the cable, a ratio, and its random walk, per root of a second.
     pub scale_sd: f64,
     /// See `scale_sd`.
     pub scale_noise: f64,
-    /// Noise of a depth sensor, its quantum excluded, m.
+    /// Noise of a depth sensor without the rounding to its quantum, m.
     pub depth_sd_m: f64,
     /// Initial offset of a depth sensor, m, and its random walk, m per root of a second.
     ///
-    /// It covers water level, density and surface pressure.
+    /// The offset contains errors of water level, density and surface pressure.
     pub depth_offset_sd_m: f64,
     /// See `depth_offset_sd_m`.
     pub depth_noise: f64,
-    /// Noise of an attitude about the vertical axis, radians.
+    /// Noise of a measured attitude about the vertical axis, radians.
     pub heading_sd_rad: f64,
     /// Deviation of a compass, radians.
     pub heading: GaussMarkov,
-    /// Noise of an attitude about horizontal axes, radians, with gyro and accelerometer data.
+    /// Noise of a measured attitude about horizontal axes if there are gyro and accelerometer data, radians.
     pub tilt_sd_rad: f64,
-    /// The same without gyro or accelerometer data, radians.
+    /// Noise of a measured attitude about horizontal axes without gyro or accelerometer data, radians.
     pub attitude_sd_rad: f64,
-    /// Noise of an echosounder, m, wall roughness included.
+    /// Noise of an echosounder's range, m, wall roughness included.
     pub echo_sd_m: f64,
     /// Length of wall along which an echosounder sees the same bump, m.
     pub bump_m: f64,
     /// Distance along the tunnel within which heads see the same bumps again, m.
     pub seen_again_m: f64,
-    /// Full width of an echosounder's beam, radians. It is uncertain which part of the wall within it echoes.
+    /// Full width of an echosounder's beam, radians. Any part of the wall within the beam may echo.
     pub echo_beam_rad: f64,
-    /// Initial scale error of all ranges against the design, a ratio.
-    ///
-    /// With its random walk, per root of a second.
+    /// Initial scale error of all ranges against the design, a ratio, and its random walk, per root of a second.
     pub range_scale_sd: f64,
     /// See `range_scale_sd`.
     pub range_scale_noise: f64,
-    /// Noise of a head's return, m, wall roughness included.
+    /// Noise of the range of a head's return, m, wall roughness included.
     pub return_sd_m: f64,
-    /// Full width of a head's beam, radians. The nearest part of the wall echoes first.
+    /// Full width of a head's beam, radians. The nearest part of the wall within the beam echoes first.
     pub return_beam_rad: f64,
-    /// Angle between used returns of a head, radians; closer ones see the same roughness.
+    /// Minimum angle between used returns of a head, radians. Returns that are closer see the same roughness.
     pub return_step_rad: f64,
     /// Noise of a velocity over ground, m/s.
     pub velocity_sd_mps: f64,
-    /// Gate: a measurement is rejected if its innovation squared exceeds this factor times its variance.
+    /// Gate: a measurement is rejected if its squared innovation exceeds the innovation's variance times this
+    /// factor.
     pub gate: f64,
-    /// Maximum age of a reading on arrival; older ones are too late.
+    /// Maximum age of a reading on arrival. Older readings are rejected as too late.
     pub window: DurNs,
     /// Length of an epoch, positive; at most 0.2 s for reliable estimates.
     ///
-    /// Readings are fused, and errors propagated, once per epoch. Epochs begin at multiples of it.
+    /// Readings are fused, and errors propagated, once per epoch. Epochs begin at whole multiples of this length.
     pub epoch: DurNs,
-    /// Whether noise levels of the sources are learnt. Likelihoods are comparable only without it.
+    /// Whether noise levels of the sources are learnt. Without learning, likelihoods of different settings can be
+    /// compared.
     pub learns: bool,
-    /// Share of the correction of attitude and related errors by wall ranges that is applied.
+    /// Share of a wall range's correction of attitude and related errors that is applied.
     ///
-    /// 0 is none and 1 the optimal estimate. Coverage depends on the attitude of one pass relative to the next. The
-    /// gyros know that better than walls, whose shape differs from the design. A smoother needs 1:
-    /// [`crate::smooth::two_filters`].
+    /// With 0, ranges do not correct the attitude; 1 is the optimal estimate. Coverage depends on the attitude of
+    /// one pass relative to the next. The gyros show that better than walls do, because walls differ in shape from
+    /// the design. A smoother needs 1: [`crate::smooth::two_filters`].
     pub wall_share: f64,
 }
 
@@ -132,7 +133,8 @@ impl Default for Settings {
             tether_sd_m: 0.005,
             slack: GaussMarkov { reach: 0.06, time_s: 2.5 },
             scale_sd: 0.002,
-            // Not configurable: a wheel's scale does not change within a dive. It keeps the variance above zero.
+            // Not configurable, because a wheel's scale does not change within a dive. A small value keeps the
+            // variance above zero.
             scale_noise: 1e-9,
             depth_sd_m: 0.02,
             depth_offset_sd_m: 0.5,
@@ -142,9 +144,10 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Not configurable: two thirds of the 0.3 m between bumps in field dives (docs/why/field.md).
+            // Not configurable: two thirds of 0.3 m, which was the distance between bumps in field dives
+            // (docs/why/field.md).
             bump_m: 0.2,
-            // Not configurable: about the vehicle's distance during half a turn of a head.
+            // Not configurable. It is about the vehicle's distance during half a turn of a head.
             seen_again_m: 0.05,
             echo_beam_rad: 25.0 * DEGREE,
             range_scale_sd: 0.03,
@@ -162,11 +165,11 @@ impl Default for Settings {
     }
 }
 
-/// Chi-square with one degree of freedom exceeds this once in a thousand times.
+/// A chi-square value with one degree of freedom exceeds this once in a thousand times.
 const GATE_999: f64 = 10.828;
 
 impl Settings {
-    /// Returns the settings with an inertial unit's own noise.
+    /// Returns the settings with the inertial unit's own noise in place of the default noise.
     #[must_use]
     pub fn with_inertial(self, noise: &InertialNoise) -> Self {
         Self {
@@ -178,7 +181,7 @@ impl Settings {
         }
     }
 
-    /// Measurement variance of a kind of sensor, in its unit squared: the reference for innovation variances.
+    /// Measurement variance of a kind of sensor, in its unit squared. Innovation variances are compared with it.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {
             SensorKind::Head => self.return_sd_m,

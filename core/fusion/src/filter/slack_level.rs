@@ -1,10 +1,11 @@
-//! Speed and size of the cable's slack, measured by comparing the counter with raw inertial motion.
+//! Size and speed of the cable's slack, measured by comparing the counter with inertial motion.
 //!
-//! Their difference is slack plus the effect of the inertial unit's constant errors, which is a second-degree
-//! polynomial in time. Its third differences contain slack alone. They are compared with those of the slack model at
-//! several lags. If they are larger than declared, the slack is faster or reaches farther. A third difference far
-//! above the usual means that the counter or the inertial unit has failed. The comparison does not depend on earlier
-//! cable readings: it uses only the heading of the estimate. Derivation: `docs/why/navigation.md`, "Slack".
+//! The difference between counter and inertial motion contains the slack. It also contains the effect of the
+//! inertial unit's constant errors, which is a polynomial of second degree in time. So its third differences show
+//! the slack alone. At several lags, they are compared with the third differences of the slack model. If they are
+//! larger than declared, the slack is larger or faster. A single third difference far above the usual size means
+//! that the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it
+//! uses only the heading of the estimate. Derivation: `docs/why/navigation.md`, "Slack".
 
 use super::inertial::InertialSample;
 use super::settings::{GaussMarkov, Settings};
@@ -16,64 +17,62 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Lags of the third differences, s.
 const LAGS_S: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
-/// Capacity for differences between counter and inertial motion: three of the longest lags at ten a second.
+/// Capacity for differences between counter and inertial motion: ten a second over three of the longest lags.
 const ROOM: usize = 256;
 /// Capacity for the inertial samples of an epoch.
 const KNOTS: usize = 256;
 /// Averaging time of the mean squares, s.
 const MEMORY_S: f64 = 40.0;
-/// Multiple of the rms at which a third difference is clipped.
-///
-/// Faults are rare and large; slack is not.
+/// Limit at which a third difference is clipped, as a multiple of the rms. Faults are rare and large; slack is not.
 const MOST_SDS: f64 = 3.0;
-/// Standard deviations by which a mean square may exceed the noise.
+/// Margin of the noise when a mean square is compared with it, in standard deviations of the mean square.
 ///
-/// A margin is needed because it comes from few independent differences.
+/// A margin is needed because the mean comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
-/// Time constant with which inertial velocity decays, s. It keeps numbers small and hardly changes a third
-/// difference.
+/// Time constant with which the inertial velocity decays, s. The decay limits the numbers and hardly changes a
+/// third difference.
 const FORGETS_S: f64 = 1000.0;
-/// Time over which the attitude is levelled and aligned with the estimate's heading, s.
+/// Time constant for levelling the attitude and aligning it with the estimate's heading, s.
 ///
-/// Only changes within a lag matter.
+/// It may be long, because only changes within a lag matter.
 const LEVELS_S: f64 = 100.0;
-/// Largest difference from the estimate's attitude, rad; beyond it the track restarts.
+/// Largest difference from the estimate's attitude, rad. Beyond it, inertial motion is integrated anew.
 const MOST_OFF_RAD: f64 = 0.3;
-/// Standard deviations within which counter and inertial motion agree.
+/// Maximum size of a third difference at which counter and inertial motion agree, in multiples of the usual size.
 ///
-/// The second constant is the number of differences needed to judge.
+/// `FEW` is the number of differences needed to judge, and `ENOUGH` the number for a known size.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
-/// Factor by which slack is assumed to be faster than declared until it has been compared.
+/// Until slack has been compared, it is assumed to be faster than declared by this factor.
 const AT_FIRST: f64 = 2.0;
-/// Third differences up to a few times this are ignored, m: a lever arm or a tilting vehicle causes them.
+/// Third differences up to `AGREES_SDS` times this are usual, m. A lever arm or a tilting vehicle causes them.
 const LEAST_M: f64 = 0.01;
-/// Possible delay between counter and inertial unit when the speed changes, s.
+/// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// Counter steps per second above which slack counts as lively.
+/// Size of third differences over a second above which slack counts as lively, in counter steps.
 const LIVELY_STEPS: f64 = 4.0;
-/// Interval at which averages are compared with the model.
+/// Time between two comparisons of the averages with the model.
 const COMPARES: DurNs = DurNs(1_000_000_000);
-/// Maximum time between compared readings.
+/// Maximum time between compared counter readings.
 const GAP: DurNs = DurNs(1_500_000_000);
-/// Shortest time constant, s, and largest reach, m, of slack. Faster changes are counter noise; larger ones are a
-/// fault.
+/// Shortest time constant, s, and largest standard deviation, m, of slack. Faster changes are counter noise, and
+/// larger ones are a fault.
 const LEAST_TIME_S: f64 = 0.15;
 pub(super) const MOST_REACH_M: f64 = 0.15;
 
-/// Level of the slack, from third differences.
+/// Estimate of the slack from third differences.
 #[derive(Debug, Clone)]
 pub(super) struct SlackEstimate {
     attitude: Option<Rot<Tunnel, Body>>,
-    /// Inertial position and velocity along the tunnel, up to their constants.
+    /// Inertial position and velocity along the tunnel, up to a constant each.
     way_m: f64,
     speed_mps: f64,
-    /// Position through the last epoch.
+    /// Inertial positions within the last epoch.
     knots: Vec<(MonoNs, [f64; 1])>,
-    /// Counter less inertial position, and the counter's reading, m.
+    /// Differences between counter and inertial position, m, each with the counter's reading, m.
     differences: Vec<(MonoNs, [f64; 2])>,
-    /// Mean squares of third differences by lag, m^2, their means, m, and the weights of the averages so far.
+    /// Third differences at each lag: their mean square, m^2, their mean, m, and their number so far.
     squares_m2: [f64; LAGS_S.len()],
     means_m: [f64; LAGS_S.len()],
     seen: [u32; LAGS_S.len()],
@@ -103,15 +102,15 @@ impl Default for SlackEstimate {
 }
 
 impl SlackEstimate {
-    /// Returns the slack's reach and time constant: the declared ones, or larger and faster ones if observed.
+    /// Returns the slack: as declared, or larger and faster if observed.
     pub(super) fn slack(&self, settings: &Settings) -> GaussMarkov {
         let declared = settings.slack;
         self.slack.unwrap_or(GaussMarkov { time_s: declared.time_s / AT_FIRST, ..declared })
     }
 
-    /// Whether slack moves a counter with this step, m, all the time.
+    /// Whether slack constantly moves a counter that has this step, m.
     ///
-    /// Third differences over a second then usually exceed [`LIVELY_STEPS`] and the noise.
+    /// On average, third differences over a second then exceed [`LIVELY_STEPS`] steps and the noise.
     pub(super) fn is_lively(&self, step_m: f64, noises: Noises, settings: &Settings) -> bool {
         let least_m = LIVELY_STEPS * step_m;
         self.squares_m2[1] > (least_m * least_m).max(noises.third_square_m2(1.0, settings))
@@ -123,9 +122,9 @@ impl SlackEstimate {
         self.knots.push((at, [self.way_m]));
     }
 
-    /// Integrates inertial data from the last knot to `until`; `about` gives heading and gyro bias.
+    /// Integrates inertial data from the last position to `until`; `about` supplies heading and gyro bias.
     ///
-    /// Without inertial data nothing is compared.
+    /// Without inertial data, nothing is compared.
     ///
     /// Allocates: never.
     pub(super) fn go_on(&mut self, felt: &InertialSample, until: MonoNs, about: &State, gravity_mps2: f64) {
@@ -149,7 +148,7 @@ impl SlackEstimate {
         let gain = up.x - self.speed_mps / FORGETS_S;
         self.way_m += (self.speed_mps + gain * dt_s / 2.0) * dt_s;
         self.speed_mps += gain * dt_s;
-        // Gravity points up: its apparent lean is removed slowly.
+        // The mean force points up. A lean of this force is removed slowly.
         let back = Vec3::<Tunnel>::new(up.y / gravity_mps2, -up.x / gravity_mps2, off.z());
         let back = rotation(back.scaled(dt_s / LEVELS_S));
         self.attitude = Some(back * (middle * rotation(rate.scaled(dt_s / 2.0))));
@@ -160,7 +159,7 @@ impl SlackEstimate {
 
     /// Processes a counter reading in the current epoch.
     ///
-    /// Returns whether counter and inertial motion agree as usual.
+    /// Returns whether counter and inertial motion agree as well as usual.
     ///
     /// Allocates: never.
     pub(super) fn hear(&mut self, at: MonoNs, shown_m: f64, noises: Noises, settings: &Settings) -> bool {
@@ -190,14 +189,14 @@ impl SlackEstimate {
         agrees
     }
 
-    /// Restarts the comparison at this time, because the counter has stuck or slipped, or a force is missing.
+    /// Restarts the comparison, because the counter has stuck or slipped, or a force is missing.
     pub(super) fn skip(&mut self) {
         self.differences.clear();
     }
 
     /// Returns the third difference of counter less inertial position, m.
     ///
-    /// The second value is the spread of the counter's distances over three lags, m.
+    /// The second value is the spread of the counter's distances in the three lags, m.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
         let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
         let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
@@ -207,16 +206,16 @@ impl SlackEstimate {
         Some([u0 - 3.0 * u1 + 3.0 * u2 - u3, most_m - least_m])
     }
 
-    /// Averages a third difference.
+    /// Adds a third difference to the averages.
     ///
-    /// Returns whether it is usual, or explained by noise and late readings, m^2.
+    /// Returns whether it has the usual size, or is explained by noise and late readings (`noise_m2`, `late_m2`).
     fn note(&mut self, lag: usize, third_m: f64, dt_s: f64, [noise_m2, late_m2]: [f64; 2]) -> bool {
         let (Some(square_m2), Some(mean_m), Some(seen)) =
             (self.squares_m2.get_mut(lag), self.means_m.get_mut(lag), self.seen.get_mut(lag))
         else {
             return true;
         };
-        // The noise counts as observed, once it is known.
+        // Once there are enough differences, the observed size includes the noise.
         let seen_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 };
         let usual_m2 = seen_m2 + late_m2 + LEAST_M * LEAST_M;
         let off_m = third_m - *mean_m;
@@ -232,7 +231,7 @@ impl SlackEstimate {
 
     /// Returns the slowest slack whose third differences are as large as observed.
     ///
-    /// It has the declared reach, or a larger one if necessary.
+    /// It is at least as large as declared.
     fn shown(&self, noises: Noises, settings: &Settings) -> GaussMarkov {
         let declared = settings.slack;
         let seen_m2: [f64; LAGS_S.len()] = core::array::from_fn(|k| {
@@ -243,7 +242,8 @@ impl SlackEstimate {
         let least_reach =
             seen_m2.iter().map(|seen| math::sqrt(seen.max(0.0) / 20.0)).fold(declared.reach, f64::max);
         let most_reach = MOST_REACH_M.max(declared.reach);
-        // A faster slack gets a larger reach, because a sine lies above a broad spectrum of the same variance.
+        // A faster slack gets a larger standard deviation. Slack that is a sine needs it, because its spectrum has
+        // a peak.
         let model = |time_s: f64| {
             let reach = declared.reach * math::sqrt(math::sqrt(math::sqrt(declared.time_s / time_s)));
             GaussMarkov { reach: reach.max(least_reach).min(most_reach), time_s }
@@ -265,28 +265,28 @@ impl SlackEstimate {
     }
 }
 
-/// Mean square of the slack's third difference over its variance, at a lag of `x` time constants.
+/// Mean square of the slack's third difference divided by the slack's variance, at a lag of `x` time constants.
 ///
-/// The autocorrelation is (1 + x) e^-x.
+/// The autocorrelation of the slack is (1 + x) e^-x.
 fn third_square(x: f64) -> f64 {
     let correlation = |x: f64| (1.0 + x) * math::exp(-x);
     20.0 - 30.0 * correlation(x) + 12.0 * correlation(2.0 * x) - 2.0 * correlation(3.0 * x)
 }
 
-/// Noise in the difference of counter and inertial motion.
+/// Noise in the difference between counter and inertial motion.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noises {
     /// Variance of the counter's noise and rounding, m^2.
     pub counter_m2: f64,
-    /// Variance of the change of a gyro bias error within [`MEMORY_S`], rad^2/s^2: it tilts gravity.
+    /// Variance of the change of a gyro bias error within [`MEMORY_S`], rad^2/s^2. Such a change tilts gravity.
     pub rate_bias_rad2ps2: f64,
 }
 
 impl Noises {
-    /// Creates it from the counter's variance, m^2, and the gyro bias.
+    /// Creates the noise from the counter's variance, m^2, and the gyro bias.
     ///
-    /// The bias is given by its variance, rad^2/s^2, and its random walk, rad^2/s^3. A constant bias error does not
-    /// count, because it is part of the mean.
+    /// `known` is the variance of the bias, rad^2/s^2, and `wander` its random walk, rad^2/s^3. A constant bias
+    /// error does not count, because it is part of the mean.
     pub(super) fn of(counter_m2: f64, known: f64, wander: f64) -> Self {
         let renewed = 1.0 - math::exp(-MEMORY_S * wander / known.max(f64::MIN_POSITIVE));
         Self { counter_m2, rate_bias_rad2ps2: renewed * known }
@@ -294,8 +294,8 @@ impl Noises {
 
     /// Mean square of the noise's third difference at a lag, m^2.
     ///
-    /// It includes the counter's white noise and the inertial unit's declared noise: white force noise, a random walk
-    /// of tilt and bias, and a rotation of gravity.
+    /// It contains the white noise of the counter and the declared noise of the inertial unit. The latter is white
+    /// force noise, a random walk of tilt and bias, and a rotation of gravity.
     fn third_square_m2(self, lag_s: f64, settings: &Settings) -> f64 {
         const GRAVITY_MPS2: f64 = 9.81;
         let tilting = GRAVITY_MPS2 * settings.rate_noise;
@@ -308,7 +308,7 @@ impl Noises {
     }
 }
 
-/// Interpolates the values at a time between their neighbours; `None` outside.
+/// Interpolates the values at a time between their neighbours; `None` outside their time span.
 pub(super) fn at_time<const N: usize>(values: &[(MonoNs, [f64; N])], at: MonoNs) -> Option<[f64; N]> {
     let next = values.partition_point(|(then, _)| *then < at);
     let (after, to) = *values.get(next)?;
@@ -332,8 +332,9 @@ mod tests {
         State::at_rest(Point3::zero(), Rot::identity())
     }
 
-    /// Level after two minutes of a known motion and tilt, with a counter that shows `slack_m` too much at each time,
-    /// s.
+    /// Returns the estimate after two minutes of a known motion, and the number of unusual readings.
+    ///
+    /// The counter shows `slack_m` too much at a time, s.
     fn level_after(slack_m: impl Fn(f64) -> f64) -> (SlackEstimate, u32) {
         let (mut level, mut unusual) = (SlackEstimate::default(), 0);
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
@@ -343,7 +344,7 @@ mod tests {
             level.begin(at(from_s - 0.1));
             for k in 1..=10_u32 {
                 let t = from_s - 0.1 + f64::from(k) / 100.0;
-                // A unit tilted by a degree, with gyro and accelerometer errors.
+                // The inertial unit is tilted by a degree, and its gyros and accelerometers have errors.
                 let force_mps2 = -0.3 / 36.0 * math::sin((t - 0.005) / 6.0);
                 let force = Vec3::new(force_mps2 + 0.17 + 0.02, 0.01, GRAVITY_MPS2);
                 let felt =
@@ -368,9 +369,9 @@ mod tests {
 
     /// The fastest change of a sine is its amplitude times its angular frequency.
     ///
-    /// That of the model is three standard deviations of its rate.
+    /// For the model, three standard deviations of its rate are compared with this.
     #[test]
-    fn lively_cable_is_faster_and_reaches_farther_than_declared() {
+    fn lively_cable_gets_larger_and_faster_slack_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
             let omega = math::TAU / period_s;
             let (level, _) = level_after(|t| amplitude_m * math::sin(omega * t));
@@ -400,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn comparison_needs_inertial_data() {
+    fn readings_without_inertial_data_count_as_usual() {
         let (mut level, _) = level_after(|_| 0.0);
         level.begin(MonoNs(127_000_000_000));
         level.go_on(
@@ -413,7 +414,7 @@ mod tests {
         assert!(level.differences.is_empty());
     }
 
-    /// Comparison with the process itself: two lags in series, stepped by a hundredth of their time constant.
+    /// The process itself is simulated: two lags in series, in steps of a hundredth of their time constant.
     #[test]
     fn slack_model_has_the_third_differences_of_the_process() {
         let (mut seed, mut rate, mut slack) = (3_u64, 0.0, 0.0);

@@ -1,4 +1,4 @@
-//! The filter's record of each source: mount, last use, and innovation statistics.
+//! The filter's record of each source: mount, last used reading, and innovation statistics.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,53 +11,55 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Reading, SonarReturn};
 use headrace_sensor::sampling::head::SILENT_AFTER;
 
-/// Limits for a stuck head: number of returns, and variation of the expected range, m.
+/// Limits for a stuck head.
 ///
-/// So many returns have one range although the expected range varies by more. A reading that is dropped by mistake
-/// costs nothing. The expected ranges must be certain to within a standard deviation, m.
+/// At least this many returns have the same range although the expected range varies by more than `VARIES_M`. The
+/// expected ranges must be certain to `SURE_M`, standard deviation. A low limit is safe, because a return that is
+/// dropped by mistake costs nothing.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Update period of attitudes, because their errors are correlated over longer times.
+/// Minimum time between used attitudes, because their errors are correlated over a longer time.
 ///
-/// The same applies to cables and depths.
+/// The same applies to cable readings and depths.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
 /// See [`ATTITUDE_PERIOD`].
 pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
 /// See [`ATTITUDE_PERIOD`].
 pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
-/// See [`ATTITUDE_PERIOD`]. Errors of a velocity log's scale, mount and bottom last for 10 s, so many readings share
-/// one.
+/// See [`ATTITUDE_PERIOD`].
+pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
+/// Number of velocity readings that share one error: errors of the log's scale, mount and bottom track last for 10
+/// s.
 ///
 /// With 3 s, a log that shows a fifth too much pulls the estimate away (`docs/why/navigation.md`, "Seeded dives").
-pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
-/// See [`VELOCITY_PERIOD`].
 pub const VELOCITY_LOOKS: f64 = 20.0;
-/// Weight of a new turn rate in the running mean.
+/// Weight of a new turn rate of a head in its running mean.
 const RATE_SHARE: f64 = 0.05;
 
-/// Innovation statistics of a source: a consistent filter has a mean NIS of 1.
+/// Innovation statistics of a source. A consistent filter has a mean NIS of 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Consistency {
-    /// Measurements used.
+    /// Number of used measurements.
     pub used: u64,
-    /// Measurements rejected by the gate.
+    /// Number of measurements rejected by the gate.
     pub gated: u64,
-    /// Readings that arrived too late to be fused.
+    /// Number of readings that arrived too late to be fused.
     pub late: u64,
-    /// Readings that were implausible or not finite, or that found no room.
+    /// Number of readings that were implausible or not finite, or for which there was no room.
     pub dropped: u64,
-    /// Sum of the normalised innovations squared (NIS) of the measurements used.
+    /// Sum of the normalised innovations squared (NIS) of the used measurements.
     pub nis_sum: f64,
     /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement.
     ///
-    /// It is the sum of NIS (clipped at the gate) less 1, and of the logarithm of the innovation variance over the
-    /// usual one. Between two interpretations of the same log, the lower value is more likely.
+    /// Each innovation adds two terms. The first is the NIS (clipped at the gate) less 1. The second is the
+    /// logarithm of the innovation's variance divided by the usual variance. If a log is interpreted in two ways,
+    /// the interpretation with the lower value is more likely.
     pub surprise: f64,
 }
 
 impl Consistency {
-    /// Counts an innovation and whether it was used.
+    /// Counts an innovation as used or rejected.
     pub fn count(&mut self, nis: f64, gate: f64, variance: f64, usual: f64) {
         self.surprise += nis.min(gate) - 1.0 + math::ln(variance / usual);
         if nis <= gate {
@@ -68,7 +70,7 @@ impl Consistency {
         }
     }
 
-    /// Returns the mean NIS of the used measurements; `None` without any.
+    /// Returns the mean NIS of the used measurements; `None` if there are none.
     pub fn nis(&self) -> Option<f64> {
         (self.used > 0).then(|| self.nis_sum / self.used as f64)
     }
@@ -81,15 +83,15 @@ pub struct Source {
     pub sensor: SensorInfo,
     /// Innovation statistics.
     pub consistency: Consistency,
-    /// Time at which one of its readings was last put into the window.
+    /// Time of the last reading that was put into the window.
     pub taken: Option<MonoNs>,
-    /// For a head, its rotation.
+    /// Rotation of a head.
     pub turning: Turning,
-    /// Level of its noise.
+    /// Learnt noise level.
     pub noise_level: NoiseLevel,
-    /// For a tether counter, its step.
+    /// Resolution step of a tether counter.
     pub count_step: CountStep,
-    /// For a head, whether its range follows the wall.
+    /// Record that shows whether the range of a head follows the wall.
     pub one_range: ConstantRange,
 }
 
@@ -115,10 +117,10 @@ impl Source {
         }
     }
 
-    /// Notes a head's range; returns whether the head reports one range in every direction.
+    /// Processes a head's range; returns whether the head reports the same range in every direction.
     ///
-    /// Inputs: the excess over the estimated range, m, and the estimate's uncertainty. Nothing is concluded while the
-    /// estimate is uncertain.
+    /// Inputs: the range less the expected range, m, and the standard deviation of the expected range, m. While the
+    /// estimate is uncertain, returns `false`.
     pub fn says_one_range(&mut self, reading: &Reading, residual_m: f64, estimate_sd_m: f64) -> bool {
         let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = reading else { return false };
         if estimate_sd_m > SURE_M {
@@ -129,7 +131,7 @@ impl Source {
         self.is_stuck()
     }
 
-    /// Whether a head's last returns have one range although the estimated ranges vary.
+    /// Whether a head's last returns have the same range although the expected ranges vary.
     fn is_stuck(&self) -> bool {
         self.one_range.is_stuck(FEW_OF_ONE_RANGE, VARIES_M)
     }
@@ -140,9 +142,8 @@ impl Source {
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since its last reading in the window.
-    ///
-    /// If so, this reading becomes the last.
+    /// Whether `period` has passed since the last reading that was put into the window. If so, this reading is the
+    /// new last.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {
@@ -154,8 +155,8 @@ impl Source {
 
 /// Whether the range of any other head follows the wall.
 ///
-/// If so, a constant range of this source is its own fault. In a round tunnel, an error of the estimate could
-/// otherwise explain it.
+/// If so, this head itself is the cause of its constant range. Otherwise an error of the estimate could be the
+/// cause, for instance in a round tunnel.
 pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
     let mut others = sources.iter().enumerate().filter(|(number, _)| *number != source);
     others.any(|(_, other)| {
@@ -165,18 +166,19 @@ pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
     })
 }
 
-/// Share of the declared variance to apply to ranges of heads: that of the head with the largest one.
+/// Returns the share of the declared variance that applies to ranges of all heads: the largest share of any head.
 ///
-/// If one head begins to see rocks, the others soon will.
+/// The largest counts, because if one head begins to see rocks, the others soon will.
 pub fn smoothness(sources: &[Option<Source>]) -> f64 {
     let heads = sources.iter().flatten().filter(|source| source.sensor.kind == SensorKind::Head);
     heads.filter_map(|head| head.noise_level.smoothness()).reduce(f64::max).unwrap_or(1.0)
 }
 
 impl Turning {
-    /// Notes a ping.
+    /// Processes a ping of a head.
     ///
-    /// Returns whether it has a range and points at least `step_rad` away from the last used one.
+    /// Returns whether the ping has a range and differs by at least `step_rad` in direction from the last used
+    /// ping.
     pub fn ping(&mut self, at: MonoNs, sonar: &SonarReturn, step_rad: f64) -> bool {
         if let Some((before, angle_rad)) = self.last {
             let dt_s = at.since(before).as_secs_f64();
@@ -196,7 +198,7 @@ impl Turning {
         elsewhere && sonar.range_m.is_some()
     }
 
-    /// Turns per second; `None` for a head that does not turn.
+    /// Returns the turns per second; `None` for a head that does not turn.
     pub fn turns_per_s(&self, now: MonoNs) -> Option<f64> {
         let (last, _) = self.last?;
         (now.since(last).0.abs() <= SILENT_AFTER.0 && self.rate_radps > 0.0)
@@ -209,7 +211,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn consistency_counts_used_and_gated_and_averages_used() {
+    fn mean_nis_covers_used_measurements_only() {
         let mut consistency = Consistency::default();
         assert_eq!(consistency.nis(), None);
         for nis in [0.5, 9.0, 2.5, 16.0, 100.0] {

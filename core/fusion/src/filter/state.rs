@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
 
-/// Number of errors.
+/// Number of errors in the error state.
 pub const ERRORS: usize = 22;
-/// Index of the error of the inertial unit's position, m, in the tunnel's frame.
+/// Index of the position error of the inertial unit, m, in the tunnel's frame.
 pub const POSITION: usize = 0;
 /// Index of the error of the cable's creep, m.
 pub const CREEP: usize = 3;
 /// Index of the velocity error of the inertial unit, m/s, in the tunnel's frame.
 pub const VELOCITY: usize = 4;
-/// Index of the attitude error: rotation vector in the tunnel's frame from estimate to truth, radians.
+/// Index of the attitude error, radians: the rotation vector from estimate to truth in the tunnel's frame.
 pub const ATTITUDE: usize = 7;
 /// Index of the error of the accelerometer bias, m/s^2, in the body's frame.
 pub const FORCE_BIAS: usize = 10;
@@ -33,13 +33,14 @@ pub const HEADING: usize = 20;
 /// Index of the error of the scale of all sonar ranges, a ratio.
 pub const RANGES: usize = 21;
 
-/// Number of values of a state.
+/// Number of values in the record of a state.
 pub const STATE_NUMBERS: usize = ERRORS + 1;
 
-/// One number for each error. Errors that drive others come after them; see `docs/why/navigation.md`.
+/// The error state, with one number for each error. An error that drives another error has a higher index; see
+/// `docs/why/navigation.md`.
 pub type Errors = [f64; ERRORS];
 
-/// The estimate.
+/// The estimated state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Position of the inertial unit.
@@ -48,23 +49,23 @@ pub struct State {
     pub velocity_mps: Vec3<Tunnel>,
     /// Rotation from body to tunnel frame.
     pub attitude: Rot<Tunnel, Body>,
-    /// Accelerometer bias, m/s^2, to be subtracted.
+    /// Accelerometer bias, m/s^2, to be subtracted from readings.
     pub force_bias_mps2: Vec3<Body>,
-    /// Gyro bias, rad/s, to be subtracted.
+    /// Gyro bias, rad/s, to be subtracted from readings.
     pub rate_bias_radps: Vec3<Body>,
-    /// Slack of the cable, m: positive where it shows too much chainage.
+    /// Slack of the cable, m; positive if the cable shows too much chainage.
     pub slack_m: f64,
-    /// Driving rate of the slack, m/s; it decays like the slack.
+    /// Driving rate of the slack, m/s. It decays with the same time constant as the slack.
     pub slack_rate_mps: f64,
-    /// Creep of the cable, m: chainage shown too large by all scale errors and slips so far.
+    /// Creep of the cable, m: the excess of shown chainage from all scale errors and slips so far.
     pub creep_m: f64,
-    /// Local scale error of the cable, a ratio; positive if it shows too much.
+    /// Local scale error of the cable, a ratio; positive if the cable shows too much.
     pub scale: f64,
-    /// Offset of the depth sensor, m: positive where it shows too much height.
+    /// Offset of the depth sensor, m; positive if the sensor shows too much height.
     pub depth_offset_m: f64,
     /// Deviation of the compass, radians, positive to the left.
     pub heading_offset_rad: f64,
-    /// Scale error of ranges, a ratio: positive if the wall is wider, or sound slower, than configured.
+    /// Scale error of ranges, a ratio; positive if the wall is wider, or sound is slower, than configured.
     pub range_scale: f64,
 }
 
@@ -106,7 +107,7 @@ impl State {
         self.heading_offset_rad += heading_rad;
     }
 
-    /// Returns the errors that take this estimate to another one, for instance the truth.
+    /// Returns the errors that change this estimate into another state, for instance the truth.
     pub fn errors_to(&self, truth: &Self) -> Errors {
         let mut errors = [0.0; ERRORS];
         put(&mut errors, POSITION, truth.position - self.position);
@@ -131,7 +132,7 @@ impl State {
         errors
     }
 
-    /// Interpolates by `share` towards another estimate; the sensor errors are those of the other.
+    /// Interpolates by `share` towards another estimate. The sensor errors are taken from the other estimate.
     #[must_use]
     pub fn between(&self, other: &Self, share: f64) -> Self {
         let turn = rotation_vector(other.attitude * self.attitude.inverse());
@@ -143,7 +144,7 @@ impl State {
         }
     }
 
-    /// Returns its values in the order of the errors, with the attitude as a quaternion.
+    /// Returns the values of the state in the order of the errors, with the attitude as a quaternion.
     pub fn numbers(&self) -> [f64; STATE_NUMBERS] {
         let [px, py, pz] = self.position.0.into();
         let [vx, vy, vz] = self.velocity_mps.0.into();
@@ -160,7 +161,7 @@ impl State {
         ]
     }
 
-    /// Reads an estimate from such values; `None` if the quaternion is invalid.
+    /// Creates a state from such values; `None` if the quaternion is invalid.
     pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
         let [
             px,
@@ -229,24 +230,24 @@ pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
     }
 }
 
-/// Returns the errors as they were `by_s` earlier.
+/// Returns the errors as they were `by_s` seconds earlier.
 pub fn earlier(errors: &Errors, by_s: f64) -> Errors {
     let mut then = *errors;
     put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
     then
 }
 
-/// Adds to one error, or to one variance of an error.
+/// Adds an amount to entry `i`; the entries are errors or their variances.
 pub fn add_to(errors: &mut Errors, i: usize, amount: f64) {
     if let Some(slot) = errors.get_mut(i) {
         *slot += amount;
     }
 }
 
-/// Returns the rotation for a rotation vector, radians.
+/// Returns the rotation that has this rotation vector, radians.
 pub fn rotation<To: Copy>(by: Vec3<To>) -> Rot<To, To> {
     let angle = by.norm();
-    // sin(a / 2) / a; as a series where the quotient would lose digits.
+    // The share is sin(a / 2) / a. For small angles it is a series, because the quotient would lose digits.
     let share = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { math::sin(angle / 2.0) / angle };
     let [x, y, z] = [by.x() * share, by.y() * share, by.z() * share];
     Rot::from_wxyz(math::cos(angle / 2.0), x, y, z).unwrap_or_else(Rot::identity)
@@ -255,7 +256,7 @@ pub fn rotation<To: Copy>(by: Vec3<To>) -> Rot<To, To> {
 /// Returns the rotation vector of a rotation, radians, with a length of 0 to pi.
 pub fn rotation_vector<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Vec3<To> {
     let [w, x, y, z] = rotation.wxyz();
-    // Antipodal quaternions are the same rotation; this takes the shorter way round.
+    // Antipodal quaternions are the same rotation. The one with the smaller angle is used.
     let (w, v) = if w < 0.0 { (-w, Vec3::new(-x, -y, -z)) } else { (w, Vec3::new(x, y, z)) };
     let sine = v.norm();
     let share = if sine < 1e-5 { 2.0 + sine * sine / 3.0 } else { 2.0 * math::atan2(sine, w) / sine };
@@ -267,7 +268,7 @@ pub fn matrix<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Matrix3<f64> {
     *UnitQuaternion::to_rotation_matrix(rotation.0).matrix()
 }
 
-/// Returns the matrix that multiplies by a cross product from the left.
+/// Returns the matrix of the cross product with `v` on the left.
 pub fn cross(v: Vector3<f64>) -> Matrix3<f64> {
     v.cross_matrix()
 }

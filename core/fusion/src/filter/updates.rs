@@ -12,7 +12,7 @@ use headrace_geometry::time::DurNs;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{Level, Reading};
 
-/// Returns the scalar updates of a reading; none if it cannot be predicted.
+/// Returns the scalar updates of a reading; none if the reading cannot be predicted.
 pub(super) fn rows(
     state: &State,
     context: &Context,
@@ -71,7 +71,7 @@ pub(super) fn rows(
     }
 }
 
-/// Rotates a unit's attitude from its level frame to the tunnel frame.
+/// Rotates the attitude of a unit from its level frame to the tunnel frame.
 pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> {
     Rot::<Tunnel, Level>::from_roll_pitch_yaw(0.0, 0.0, -site.axis_yaw_rad) * level
 }

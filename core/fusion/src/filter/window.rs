@@ -1,6 +1,6 @@
 //! Reordering window that releases readings in order of validity.
 //!
-//! Readings wait until all readings of their time have arrived.
+//! A reading waits until all readings with an earlier time of validity have arrived.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,8 +18,8 @@ const MOST_FELT: usize = 1024;
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
 /// Time within which samples are merged into their mean.
 ///
-/// They are rate and force of one sample, or several samples of one burst. The mean of a burst covers all the time
-/// since the sample before it.
+/// Merged samples are the rate and the force of one sample, or several samples of one burst. The mean of a burst
+/// applies to the whole time since the sample before it.
 const SAME: DurNs = DurNs(500_000);
 
 /// A waiting reading.
@@ -27,13 +27,13 @@ const SAME: DurNs = DurNs(500_000);
 pub struct Waiting {
     /// Time of validity.
     pub at: MonoNs,
-    /// Number of its source.
+    /// Number of the source.
     pub source: usize,
     /// The reading.
     pub reading: Reading,
 }
 
-/// Means of the samples at one time, and their numbers of rates and forces.
+/// Mean of the samples at one time, with the number of rates and the number of forces in it.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct FeltAt {
     at: MonoNs,
@@ -41,12 +41,12 @@ struct FeltAt {
     counts: [u32; 2],
 }
 
-/// Readings in order of validity; readings of the same time in order of arrival.
+/// Readings in order of validity; readings with equal times stay in order of arrival.
 #[derive(Debug, Clone)]
 pub struct Window {
     waiting: Vec<Waiting>,
     felt: Vec<FeltAt>,
-    /// Time of the last implausible force that may have been real, and its speed change, m/s.
+    /// Time of the last implausible force, and the speed change by such forces, m/s. The forces may have been real.
     jolt: Option<(MonoNs, f64)>,
 }
 
@@ -59,7 +59,7 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Inserts a reading in order; returns false if there is no room.
+    /// Inserts a reading in order of validity; returns false if there is no room.
     pub fn take(&mut self, reading: Waiting) -> bool {
         if self.waiting.len() == MOST {
             return false;
@@ -83,7 +83,8 @@ impl Window {
             .is_some()
     }
 
-    /// Notes a rejected force, m/s^2, and its speed change over the time since the previous sample.
+    /// Records a rejected force, m/s^2. Adds the speed change that it would cause over the time since the previous
+    /// sample.
     pub fn take_jolt(&mut self, at: MonoNs, force_mps2: f64) {
         let before = self.felt.iter().rev().map(|felt| felt.at).find(|felt| *felt < at);
         let lasted = before.map_or(SPEAKS_FOR, |before| at.since(before).min(SPEAKS_FOR));
@@ -91,12 +92,13 @@ impl Window {
         self.jolt = Some((at, carried_mps + force_mps2 * lasted.as_secs_f64()));
     }
 
-    /// Takes the speed change of implausible forces up to a time, m/s.
+    /// Returns the speed change by implausible forces up to a time, m/s, and clears it.
     pub fn jolted(&mut self, until: MonoNs) -> f64 {
         self.jolt.take_if(|(at, _)| *at <= until).map_or(0.0, |(_, speed_mps)| speed_mps)
     }
 
-    /// Returns time and speed change, m/s, of implausible forces that are not fused yet.
+    /// Returns the time of the last implausible force that is not fused yet, and the speed change by such forces,
+    /// m/s.
     pub fn jolt(&self) -> Option<(MonoNs, f64)> {
         self.jolt
     }
@@ -114,9 +116,9 @@ impl Window {
         self.felt.get_mut(place)
     }
 
-    /// Returns the inertial data valid from `from` on, and the end of their validity, at most `until`.
+    /// Returns the inertial data valid from `from` on, and the end of their validity, which is at most `until`.
     ///
-    /// A sample is the mean over the time before it.
+    /// A sample is the mean over the time before its timestamp.
     pub fn felt(&self, from: MonoNs, until: MonoNs) -> (InertialSample, MonoNs) {
         let next = self.felt.partition_point(|felt| felt.at <= from);
         let speaking = |number: Option<usize>| {
@@ -134,7 +136,7 @@ impl Window {
                 );
             }
         };
-        // A unit may send rates and forces alternately; the nearest of each is used.
+        // A unit may send rates and forces alternately. So the nearest rate and the nearest force are used.
         let near = |pick: fn(&InertialSample) -> Option<Vec3<Body>>| {
             pick(&sample).or_else(|| {
                 let around = [Some(next + 1), next.checked_sub(1), next.checked_sub(2)];
@@ -148,24 +150,24 @@ impl Window {
         (felt, at.max(from + DurNs(1)).min(until))
     }
 
-    /// Removes the first reading valid at or before `until`.
+    /// Removes and returns the first reading, if it is valid at or before `until`.
     pub fn pop(&mut self, until: MonoNs) -> Option<Waiting> {
         let first = self.waiting.first()?;
         (first.at <= until).then(|| self.waiting.remove(0))
     }
 
-    /// Time of validity of the next reading of any kind after `at`.
+    /// Returns the time of the next reading or inertial sample after `at`.
     pub fn next_heard(&self, at: MonoNs) -> Option<MonoNs> {
         let waiting = self.waiting.first().map(|waiting| waiting.at);
         waiting.into_iter().chain(self.next_felt(at)).min()
     }
 
-    /// Time of the next inertial sample after `at`.
+    /// Returns the time of the next inertial sample after `at`.
     pub fn next_felt(&self, at: MonoNs) -> Option<MonoNs> {
         self.felt.get(self.felt.partition_point(|felt| felt.at <= at)).map(|felt| felt.at)
     }
 
-    /// Removes everything.
+    /// Removes all readings and samples.
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.felt.clear();
@@ -178,14 +180,14 @@ impl Window {
         self.waiting.drain(..old);
     }
 
-    /// Removes inertial samples not needed for any time after `at`.
+    /// Removes inertial samples that no time after `at` needs.
     pub fn forget(&mut self, at: MonoNs) {
         let old = self.felt.partition_point(|other| other.at + SPEAKS_FOR < at);
         self.felt.drain(..old.saturating_sub(2));
     }
 }
 
-/// Adds one more value to a running mean.
+/// Adds a value to a running mean.
 fn take_mean(mean: &mut Option<Vec3<Body>>, of: &mut u32, value: Vec3<Body>) {
     *of = of.saturating_add(1);
     *mean = Some(mean.map_or(value, |mean| mean + (value + -mean).scaled(1.0 / f64::from(*of))));

@@ -1,6 +1,6 @@
-//! Detection of zero velocity (ZUPT).
+//! Detection of a vehicle at rest, for zero-velocity updates (ZUPT).
 //!
-//! The gyros of a vehicle at rest on deck or on the ground show their bias.
+//! At rest on deck or on the ground, the mean readings of the gyros are their bias.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,22 +9,24 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// Averaging window. A floating vehicle never stays steady for `MEANS` windows.
+/// Averaging window, and the number of equal means in a row that show rest. A floating vehicle never reaches this
+/// number.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
-/// Number of means at rest after which the bias is known.
+/// Number of means at rest after which the gyro bias is known.
 const ENOUGH: u32 = 25;
-/// Seconds after which a stationary vehicle that is not at rest counts as floating.
+/// Time after which a vehicle on a stationary cable counts as floating if it has not been at rest, s.
 const FLOATS: u32 = 15;
 /// Time after the first estimate during which the pilot is asked to keep the vehicle still.
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
-/// Number of remembered pauses of the cable.
+/// Number of remembered pauses of the cable, and the multiple of the longest pause after which the cable is at
+/// rest.
 ///
-/// The cable counts as at rest after a multiple of the longest pause. A winch operator who winds by half metres
-/// leaves the cable stationary between pulls while the vehicle moves on.
+/// They are needed if a winch operator winds by half metres. The cable is then stationary between pulls while the
+/// vehicle moves on.
 const PAUSES: usize = 4;
 const PAUSES_TO_REST: u64 = 2;
-/// Largest difference between means at rest: turn rate, rad/s, and specific force, m/s^2.
+/// Largest difference between means at rest: of the turn rate, rad/s, and of the specific force, m/s^2.
 const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
 
@@ -36,20 +38,21 @@ pub struct RestDetector {
     cable_m: Option<f64>,
     cable_still: bool,
     cable_at: MonoNs,
-    /// Time of the cable's last movement, and the lengths of the pauses before it, the latest last.
+    /// Time of the cable's last movement, and the lengths of the pauses before it, the latest one last.
     cable_moved_at: Option<MonoNs>,
     pauses: [DurNs; PAUSES],
     /// Number of means taken at rest.
     rested: u32,
-    /// Seconds for which the cable has been stationary without the vehicle being at rest.
+    /// Time for which the cable has been stationary although the vehicle is not at rest, s.
     floated: u32,
-    /// Whether the vehicle floats: stationary for long without being at rest, and not at rest since.
+    /// Whether the vehicle floats: it was not at rest for long on a stationary cable, and it has not been at rest
+    /// since.
     floats: bool,
-    /// Start of the first estimate.
+    /// Time of the first estimate.
     asks_from: Option<MonoNs>,
 }
 
-/// Means of successive windows, each compared with the first of a steady run.
+/// Means of successive windows. Each mean is compared with the first mean of a steady run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Means {
     since: Option<MonoNs>,
@@ -57,12 +60,12 @@ struct Means {
     count: f64,
     first: Option<[f64; 3]>,
     alike: u32,
-    /// Latest mean, until it is taken.
+    /// Latest mean, until [`RestDetector::take_mean_rate`] takes it.
     latest: Option<[f64; 3]>,
 }
 
 impl Means {
-    /// Adds a value; returns whether a window ended with it.
+    /// Adds a value; returns whether the value ended a window.
     fn take(&mut self, at: MonoNs, value: [f64; 3], same: f64) -> bool {
         let since = *self.since.get_or_insert(at);
         let ends = at.since(since).0 >= MEAN_OVER.0;
@@ -89,7 +92,7 @@ impl RestDetector {
         match (kind, reading) {
             (SensorKind::Imu, Reading::AngularRate(rate)) => {
                 if at.since(self.cable_at).0 > MEAN_OVER.0 {
-                    // A silent counter is no evidence that the cable is stationary.
+                    // If the counter is silent, nothing shows that the cable is stationary.
                     self.moved();
                 }
                 let ended = self.rate.take(at, [rate.x(), rate.y(), rate.z()], SAME_RATE);
@@ -120,7 +123,7 @@ impl RestDetector {
         (self.rate.alike, self.force.alike, self.floated) = (0, 0, 0);
     }
 
-    /// Notes that the cable has moved again.
+    /// Records the length of a pause, because the cable has moved again.
     fn note_pause(&mut self, at: MonoNs) {
         if let Some(before) = self.cable_moved_at.replace(at) {
             self.pauses.rotate_left(1);
@@ -138,27 +141,27 @@ impl RestDetector {
         })
     }
 
-    /// Whether gyros and accelerometers have been steady for long, and the cable has been at rest for as long.
+    /// Whether the vehicle is at rest: gyros and accelerometers have been steady for long, and so has the cable.
     pub fn is_still(&self) -> bool {
         self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still && self.cable_rests()
     }
 
-    /// Takes the mean turn rate of the last window at rest, rad/s.
+    /// Returns the mean turn rate of the last window at rest, rad/s, once for each window.
     pub fn take_mean_rate(&mut self) -> Option<Vec3<Sensor>> {
         let [x, y, z] = self.rate.latest.take()?;
         self.rested = self.rested.saturating_add(1);
         Some(Vec3::new(x, y, z))
     }
 
-    /// Notes the start of an estimate.
+    /// Records the time of an estimate; only the first time counts.
     pub fn ask_from(&mut self, at: MonoNs) {
         self.asks_from.get_or_insert(at);
     }
 
     /// Returns how much longer the vehicle should stand still for its gyro bias to become known, s.
     ///
-    /// 0 for a vehicle that floats or has too noisy a unit: even when stationary, it is not at rest. 0 later in a
-    /// dive, too, because uncertain passes then seldom come from the gyros.
+    /// 0 if the vehicle floats or its unit is too noisy, because then no stop counts as rest. Also 0 later in a
+    /// dive, because by then the gyros seldom cause uncertain passes.
     pub fn lacking_s(&self, now: MonoNs) -> u32 {
         let lacking = ENOUGH.saturating_sub(self.rested);
         let begins = self.asks_from.is_some_and(|from| (0..ASKS_FOR.0).contains(&now.since(from).0));
@@ -175,7 +178,7 @@ mod tests {
     use headrace_geometry::math;
     use headrace_sensor::reading::TetherLength;
 
-    /// Whether it is at rest after twenty seconds with this turn rate and cable length.
+    /// Whether the vehicle is at rest after twenty seconds with this turn rate and cable length.
     fn still(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> Option<f64>) -> bool {
         let mut stillness = RestDetector::default();
         for k in 0..2000_u32 {
@@ -195,9 +198,9 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_on_deck_is_at_rest_and_floating_one_is_not() {
+    fn vehicle_on_deck_is_at_rest_and_floating_vehicle_is_not() {
         assert!(still(|_| 0.003, |_| Some(0.0)), "biases and noise are no motion");
-        assert!(!still(|t| 0.01 * math::sin(t / 2.0), |_| Some(0.0)), "it turns to and fro");
+        assert!(!still(|t| 0.01 * math::sin(t / 2.0), |_| Some(0.0)), "the vehicle turns to and fro");
         assert!(!still(|_| 0.0, |t| Some(0.05 * t)), "the cable runs");
         assert!(!still(|_| 0.0, |t| (t < 5.0).then_some(0.0)), "the counter fell silent");
         assert!(
@@ -206,11 +209,12 @@ mod tests {
         );
     }
 
-    /// A cable wound in by half metres pauses for longer than the means take, and the vehicle moves on meanwhile.
+    /// If the cable is wound in by half metres, it pauses for longer than the means take, and the vehicle moves
+    /// meanwhile.
     ///
-    /// The vehicle is at rest once the cable has been stationary for twice as long as between the last pulls.
+    /// The vehicle is at rest once the cable has been stationary for twice the time between the last pulls.
     #[test]
-    fn cable_wound_in_by_pulls_is_not_at_rest() {
+    fn vehicle_on_a_cable_wound_in_by_pulls_is_not_at_rest() {
         let pulled = |speed_mps: f64, t: f64| 0.5 * math::floor_to_i64(2.0 * speed_mps * t) as f64;
         let mut stillness = RestDetector::default();
         let mut rested_s = 0_u32;
@@ -218,7 +222,7 @@ mod tests {
             let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
             stillness.take(at, SensorKind::Imu, &Reading::AngularRate(Vec3::zero()));
             stillness.take(at, SensorKind::Imu, &Reading::SpecificForce(Vec3::new(0.0, 0.0, 9.8)));
-            // One pull every 7 s for 63 s.
+            // The cable is pulled once every 7 s, for 63 s.
             let length_m = pulled(0.5 / 7.0, t.min(63.5));
             let length = TetherLength { length_m, resolution_m: 0.001, restart: None };
             stillness.take(
@@ -233,7 +237,8 @@ mod tests {
         assert!(stillness.is_still(), "the cable has been stationary for 27 s");
     }
 
-    /// Seconds still required at `end_s`, with this turn rate and cable length.
+    /// Returns how many more seconds of standing still are required at `end_s`, with this turn rate and cable
+    /// length.
     fn lacking_s(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64, end_s: u32) -> u32 {
         let mut stillness = RestDetector::default();
         stillness.ask_from(MonoNs(0));
@@ -255,14 +260,14 @@ mod tests {
     fn floating_vehicle_is_not_asked_to_stand_still_again() {
         let sways = |t: f64| 0.01 * math::sin(t / 2.0);
         let set_off = |t: f64| (t - 40.0).max(0.0) * 0.1;
-        assert_eq!(lacking_s(|_| 0.0, |_| 0.0, 35), 0, "it has stood still");
-        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "it has only moved on");
-        assert_eq!(lacking_s(sways, |_| 0.0, 10), 30, "it may yet come to rest");
-        assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "it is floating");
-        assert_eq!(lacking_s(sways, set_off, 55), 0, "it was floating before");
+        assert_eq!(lacking_s(|_| 0.0, |_| 0.0, 35), 0, "the vehicle has stood still long enough");
+        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "the vehicle has never stood still");
+        assert_eq!(lacking_s(sways, |_| 0.0, 10), 30, "the vehicle may still come to rest");
+        assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "the vehicle is floating");
+        assert_eq!(lacking_s(sways, set_off, 55), 0, "the vehicle was floating before");
         let lands = |t: f64| if t < 30.0 { sways(t) } else { 0.0 };
-        assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "it now stands still");
-        // A slow vehicle moves on, with a coarse counter that pauses between its steps.
+        assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "the vehicle now stands still");
+        // The vehicle moves slowly, and its coarse counter pauses between steps.
         assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 55), 30);
         assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 61), 0, "the dive is under way");
         let mut set_back = RestDetector::default();

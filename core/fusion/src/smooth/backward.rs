@@ -1,4 +1,4 @@
-//! Backward pass over a dive: corrects each estimate of the filter by the measurements after it.
+//! Backward pass over a dive: corrects each estimate of the filter by later measurements.
 
 use super::relative_backward::Later;
 use super::rts_step::Gain;
@@ -14,11 +14,11 @@ use headrace_geometry::time::MonoNs;
 /// A smoothed estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Its time.
+    /// Time of the estimate.
     pub at: MonoNs,
     /// The smoothed state.
     pub state: State,
-    /// Covariance of its errors.
+    /// Covariance of the state's errors.
     pub factors: Factors<ERRORS>,
 }
 
@@ -27,14 +27,14 @@ pub struct Backward {
     settings: Settings,
     now: Option<(u32, Estimate)>,
     later: Later,
-    /// In reverse order, like their points.
+    /// Pieces, points and relative covariances so far, all in reverse order.
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
 }
 
 impl Backward {
-    /// Creates it with the settings of the filter.
+    /// Creates the pass with the settings of the filter.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
@@ -46,15 +46,15 @@ impl Backward {
         }
     }
 
-    /// Processes the step before the one processed last.
+    /// Processes a step. Steps arrive in reverse order.
     ///
-    /// Allocates: the step's point of the track.
+    /// Allocates: the point that it adds to the track.
     pub fn take(&mut self, placed: &Placed) {
         let step = &placed.step;
         let after = self.now.filter(|(piece, _)| *piece == placed.piece).map(|(_, after)| after);
         let smoothed = after.and_then(|after| self.smooth(step, &after));
         let now = smoothed.unwrap_or_else(|| {
-            // There is no later information: the filter's estimate is kept.
+            // Without a later estimate in the same piece, the filter's estimate is kept.
             self.end_piece();
             self.pieces.push(Piece::begin(placed, self.points.len(), self.relatives.len()));
             Estimate { at: step.at, state: step.state, factors: step.factors }
@@ -70,7 +70,7 @@ impl Backward {
         self.now = Some((placed.piece, now));
     }
 
-    /// Returns the estimate smoothed last, which is the earliest in time so far.
+    /// Returns the last smoothed estimate, which is the earliest in time so far.
     pub fn now(&self) -> Option<&Estimate> {
         self.now.as_ref().map(|(_, now)| now)
     }
@@ -81,9 +81,9 @@ impl Backward {
         Track::of_reversed(self.pieces, self.points, self.relatives, self.settings.epoch)
     }
 
-    /// Smooths the estimate at the step's beginning from the one at its end.
+    /// Smooths the estimate at the beginning of a step, given the smoothed estimate at its end.
     ///
-    /// `None` if the result is not finite.
+    /// `None` if the step ends its piece, or if the result is not finite.
     fn smooth(&mut self, step: &Step, after: &Estimate) -> Option<Estimate> {
         if matches!(step.by, Move::End) {
             return None;

@@ -1,4 +1,4 @@
-//! Bounded output queue of the filter's steps; the recorder drains it between ticks.
+//! Bounded queue for the steps of the filter, which the recorder drains between ticks.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,7 +16,7 @@ pub struct Journal {
     clock: u32,
 }
 
-/// Reading end of the queue; records come out in order.
+/// Reading end of the queue; returns records in the order of writing.
 #[derive(Clone)]
 pub struct JournalReader {
     queue: Arc<Shared>,
@@ -30,27 +30,27 @@ struct Shared {
 impl Journal {
     /// Creates a queue for `capacity` records; returns both ends.
     ///
-    /// Allocates: all of it.
+    /// Allocates: the whole queue.
     pub fn new(capacity: usize) -> (Self, JournalReader) {
         let queue =
             Arc::new(Shared { records: ArrayQueue::new(capacity.max(1)), dropped: AtomicU64::new(0) });
         (Self { queue: Arc::clone(&queue), piece: 0, clock: 0 }, JournalReader { queue })
     }
 
-    /// Begins a new piece with a first estimate that is unrelated to the earlier ones.
+    /// Begins a new piece of the track, whose first estimate is unrelated to earlier ones.
     pub fn begin(&mut self) {
         self.piece = self.piece.saturating_add(1);
     }
 
-    /// Notes that the clock has been set back.
+    /// Counts that the clock has been set back.
     pub fn clock_set(&mut self) {
         self.clock = self.clock.saturating_add(1);
     }
 
     /// Writes a step.
     ///
-    /// A step that is not sound, or that finds the queue full, breaks the track: later steps can no longer correct
-    /// earlier ones.
+    /// A step is dropped if it is not finite or if the queue is full. The track then breaks: later steps can no
+    /// longer correct earlier ones.
     ///
     /// Allocates: never.
     pub fn write(&mut self, step: &Step, unit_at: Vec3<Body>, gap: DurNs) {
@@ -67,7 +67,7 @@ impl Journal {
 }
 
 impl JournalReader {
-    /// Takes the oldest waiting record.
+    /// Removes and returns the oldest record in the queue.
     pub fn next(&self) -> Option<Words> {
         self.queue.records.pop()
     }

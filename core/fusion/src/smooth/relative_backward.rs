@@ -1,6 +1,7 @@
-//! Relative error covariance between two smoothed epochs, one head pass apart.
+//! Relative error covariance between a smoothed epoch and the epoch of the previous head pass.
 //!
-//! On the backward pass, each later epoch waits until the pass reaches the epoch one gap earlier.
+//! The backward pass reaches the later epoch first. This epoch then waits until the pass reaches the epoch one gap
+//! earlier.
 
 use super::rts_step::Gain;
 use crate::filter::clones::{CLONES, MOVING, STEP};
@@ -9,24 +10,24 @@ use crate::filter::state::{ERRORS, Errors};
 use crate::relative::Relative;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Gap of an epoch with no related earlier pass, because the cable has slipped in between.
+/// Gap of an epoch to which no earlier pass is related, because the cable has slipped since.
 pub const UNTIED: DurNs = DurNs(i64::MAX);
-/// Standard deviation of the chainage of such an epoch, m.
+/// Standard deviation of the relative chainage error of such an epoch, m.
 const UNTIED_M: f64 = 1e3;
 
-/// An epoch that waits for its earlier pass.
+/// An epoch that waits until the backward pass reaches the previous head pass.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
-    /// Its index in the results.
+    /// Index of the epoch in the results.
     number: usize,
     at: MonoNs,
     /// Time since the previous pass of the heads.
     gap: DurNs,
-    /// Rows of its covariance, for the errors that move a sample.
+    /// Rows of the epoch's covariance for the errors that move a sample.
     own: [Errors; 3],
-    /// Cross-covariances of this epoch's three errors with all errors at the current epoch.
+    /// Cross-covariances of these errors with all errors at the current epoch of the backward pass.
     with: [Errors; 3],
-    /// Time from the current epoch to this one, s, and the relative covariance between both.
+    /// Time from the current epoch to this one, s, and their relative covariance.
     age_s: f64,
     relative: Relative,
 }
@@ -38,18 +39,18 @@ pub struct Later {
     newest: Option<MonoNs>,
 }
 
-/// Index of an epoch, and its covariance relative to the pass before.
+/// Index of an epoch in the results, and its covariance relative to the previous head pass.
 pub type Answer = (usize, Relative);
 
 impl Later {
-    /// Whether an epoch is at least one step from the last one noted.
+    /// Whether the time `at` is at least one step before the epoch that was added last.
     pub fn is_due(&self, at: MonoNs) -> bool {
         self.newest.is_none_or(|newest| newest.since(at).0 >= STEP.0)
     }
 
     /// Adds an epoch that waits for the epoch one `gap` earlier.
     ///
-    /// If there is no room, it drops the oldest waiting epoch and returns its answer.
+    /// If there is no room, it removes the epoch that has waited longest and returns its answer.
     pub fn note(
         &mut self,
         number: usize,
@@ -65,7 +66,7 @@ impl Later {
         first
     }
 
-    /// Moves to an earlier epoch and answers the epochs that waited for it.
+    /// Moves the backward pass to an earlier epoch, and answers the epochs that waited for it.
     pub fn back(
         &mut self,
         at: MonoNs,
@@ -88,7 +89,7 @@ impl Later {
         });
     }
 
-    /// Ends a piece: answers all waiting epochs.
+    /// Ends a piece of the track, and answers all waiting epochs.
     pub fn end(&mut self, answer: impl FnMut(Answer)) {
         self.waiting.drain(..).map(|moment| moment.answer()).for_each(answer);
         self.newest = None;
@@ -96,7 +97,7 @@ impl Later {
 }
 
 impl Moment {
-    /// Extrapolates the covariance linearly in time.
+    /// Extrapolates the relative covariance linearly in time to the full gap.
     fn answer(&self) -> Answer {
         if self.gap == UNTIED {
             return (self.number, Relative::along(UNTIED_M));
@@ -108,7 +109,7 @@ impl Moment {
 
 /// Returns the covariance of the difference between the errors of two epochs.
 ///
-/// `own` is that of the later epoch, `before` that of the earlier one, and `with` their cross-covariance.
+/// `own` belongs to the later epoch and `before` to the earlier one; `with` is their cross-covariance.
 fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relative {
     let of = |rows: &[Errors; 3], row: usize, error: usize| {
         rows.get(row).and_then(|row| row.get(error)).copied().unwrap_or(0.0)
@@ -124,9 +125,9 @@ fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relat
 mod tests {
     use super::*;
 
-    /// Epochs arrive latest first. One is noted if it is at least a step from the last one noted.
+    /// Epochs arrive latest first. An epoch is due if it is at least one step before the epoch that was added last.
     #[test]
-    fn epochs_are_noted_one_step_apart() {
+    fn epoch_is_due_one_step_before_the_last_one() {
         let at = |s: u64| MonoNs(1_000_000_000 * s);
         let mut later = Later::default();
         assert!(later.is_due(at(100)));

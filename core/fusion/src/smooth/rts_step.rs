@@ -1,25 +1,26 @@
-//! One step of the Rauch-Tung-Striebel smoother on factors.
+//! One step of the Rauch-Tung-Striebel smoother, with factored covariances.
 //!
 //! Factors keep the covariance symmetric and non-negative.
 //!
-//! Source: H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA J. 3, 1965.
+//! Source: H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA J. 3,
+//! 1965.
 
 use crate::filter::factors::Factors;
 
-/// Smoother gain: maps corrections at a step's end to its beginning.
+/// Smoother gain: maps corrections at the end of a step to corrections at its beginning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gain<const N: usize> {
     /// Rows of C = P F^T (F P F^T + Q)^-1.
     rows: [[f64; N]; N],
-    /// Rows of I - C F: the part of the error that the end does not determine.
+    /// Rows of I - C F, for the part of the error that the end of the step does not determine.
     rest: [[f64; N]; N],
 }
 
 impl<const N: usize> Gain<N> {
     /// Creates the gain of a step.
     ///
-    /// Inputs: the covariance at the beginning, the step's error transition, and the covariance at the end before the
-    /// measurements there.
+    /// Inputs: the covariance at the beginning, the error transition of the step, and the covariance predicted for
+    /// the end.
     pub fn new(before: &Factors<N>, carry: impl Fn(&mut [f64; N]), predicted: &Factors<N>) -> Self {
         let unit: [[f64; N]; N] =
             core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }));
@@ -41,15 +42,16 @@ impl<const N: usize> Gain<N> {
         Self { rows, rest }
     }
 
-    /// Maps errors at the end to errors at the beginning.
+    /// Maps errors at the end of the step to errors at its beginning.
     pub fn back(&self, errors: &[f64; N]) -> [f64; N] {
         self.rows.map(|row| sum(&row, errors))
     }
 
-    /// Returns the smoothed covariance at the beginning.
+    /// Returns the smoothed covariance at the beginning of the step.
     ///
-    /// Inputs: the filter's P there, and the smoothed S at the end with the step's noise Q added. The result is `(I -
-    /// C F) P (I - C F)^T + C (S + Q) C^T`, which equals P + C (S - F P F^T - Q) C^T.
+    /// Inputs: the filter's covariance P at the beginning, and S + Q: the smoothed covariance at the end plus the
+    /// noise of the step. The result is `(I - C F) P (I - C F)^T + C (S + Q) C^T`, which equals P + C (S - F P F^T
+    /// - Q) C^T.
     pub fn smoothed(&self, before: &Factors<N>, end_and_noise: &Factors<N>) -> Factors<N> {
         Factors::of_sum([(before, &self.rest), (end_and_noise, &self.rows)])
     }

@@ -1,4 +1,4 @@
-//! A step between two estimates of the filter, and its record.
+//! A step between two estimates of the filter, and the record of a step.
 
 use crate::filter::factors::Factors;
 use crate::filter::inertial::{LEG_NUMBERS, Leg};
@@ -7,29 +7,29 @@ use crate::filter::state::{ERRORS, Errors, STATE_NUMBERS, State};
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Numbers of a covariance's factors.
+/// Number of values in a covariance's factors.
 const FACTOR_NUMBERS: usize = ERRORS * (ERRORS + 1) / 2;
-/// Header words of a record: both times, the kind of move, piece, clock and gap.
+/// Number of header words of a record: both times, the kind of change, piece, clock and gap.
 const HEADER: usize = 6;
-/// Words of a record.
+/// Number of words of a record.
 pub const WORDS: usize = HEADER + 3 + 2 * STATE_NUMBERS + FACTOR_NUMBERS + LEG_NUMBERS;
 
-/// A record: integers as they are, floats as their bits. Shorter steps leave its tail unused.
+/// A record. Words are integers, or floats as their bits. Words that a short step does not need are unused.
 pub type Words = [u64; WORDS];
 
-/// Change between two estimates that measurements do not cause.
+/// Change between two estimates for other reasons than a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "most are legs, and few are kept at a time")]
 pub enum Move {
     /// Propagation over a leg.
     Leg(Leg),
-    /// Variances added to those of the errors, which had been underestimated.
+    /// Addition to the variances of errors that had been underestimated.
     Widened(Errors),
     /// No change: this is the last estimate of its piece.
     End,
 }
 
-/// A step from an estimate after its measurements to the prediction before the next measurements.
+/// A step from an estimate that includes its measurements to the prediction for the next measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Start time.
@@ -38,22 +38,22 @@ pub struct Step {
     pub to: MonoNs,
     /// Estimate at the beginning.
     pub state: State,
-    /// Covariance of its errors.
+    /// Covariance of the errors of `state`.
     pub factors: Factors<ERRORS>,
-    /// The change.
+    /// Change during the step.
     pub by: Move,
-    /// Estimate at the end, before the measurements there.
+    /// Predicted estimate at the end, before the measurements at that time.
     pub predicted: State,
 }
 
-/// A step with its place in the dive.
+/// A step with its context in the dive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
     /// The step.
     pub step: Step,
-    /// Position of the inertial unit on the vehicle, m; the estimate refers to it.
+    /// Position of the inertial unit on the vehicle, m. The estimate refers to this position.
     pub unit_at: Vec3<Body>,
-    /// Time between two passes of the heads over a place.
+    /// Time between two passes of the heads over the same position.
     pub gap: DurNs,
     /// Number of the piece; a piece is a run of contiguous steps.
     pub piece: u32,
@@ -69,14 +69,14 @@ impl Step {
 }
 
 impl Move {
-    /// Propagates errors from the beginning to the end.
+    /// Propagates errors from the beginning to the end of the step.
     pub fn carry(&self, settings: &Settings, errors: &mut Errors) {
         if let Self::Leg(leg) = self {
             leg.transition(settings).apply(errors);
         }
     }
 
-    /// Adds the process noise to the covariance at the end.
+    /// Adds the process noise of the step to a covariance.
     pub fn disturb(&self, settings: &Settings, factors: &mut Factors<ERRORS>) {
         match self {
             Self::Leg(leg) => leg.disturb(settings, &leg.transition(settings), factors),
@@ -85,7 +85,7 @@ impl Move {
         }
     }
 
-    /// Returns the covariance before the measurements at the end, bit-identical to the filter's.
+    /// Returns the covariance predicted for the end, bit-identical to the filter's.
     pub fn predict(&self, settings: &Settings, factors: &Factors<ERRORS>) -> Factors<ERRORS> {
         let mut predicted = *factors;
         if let Self::Leg(leg) = self {
@@ -128,7 +128,7 @@ impl Placed {
         words
     }
 
-    /// Parses a record; `None` if it is malformed.
+    /// Parses a record; `None` if the record is malformed.
     pub fn of_words(words: &Words) -> Option<Self> {
         let (header, numbers) = words.split_first_chunk::<HEADER>()?;
         let [at, to, kind, piece, clock, gap] = *header;

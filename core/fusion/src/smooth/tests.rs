@@ -1,6 +1,6 @@
 //! Comparison of the smoother with an independent oracle.
 //!
-//! The oracle is batch least squares over all errors at all times, by normal equations.
+//! The oracle is batch least squares over all errors at all times, solved by normal equations.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -13,7 +13,7 @@ use crate::filter::state::{ERRORS, State};
 use headrace_geometry::frames::{Point3, Rot, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Position, speed, sensor bias.
+/// Number of errors: position, speed, sensor bias.
 const N: usize = 3;
 const TIMES: usize = 12;
 const ALL: usize = N * TIMES;
@@ -34,7 +34,7 @@ fn white(time: usize) -> [f64; N] {
     [place + if time == JUMP.0 { JUMP.1 } else { 1e-3 }, speed, bias]
 }
 
-/// Measurements in turn: position with bias, speed, position, none.
+/// Returns one of four measurements in turn: position with bias, speed, position, none.
 fn measured(time: usize) -> Option<([f64; N], f64)> {
     let value = f64::from(u32::try_from((time * 37) % 11).unwrap()) / 4.0;
     match time % 4 {
@@ -51,7 +51,7 @@ struct Known {
     covariance: SMatrix<f64, ALL, ALL>,
 }
 
-/// Solves for all times at once: sums the information of the start, the steps and the measurements, then inverts it.
+/// Solves for all times at once: adds up the information of the start, steps and measurements, and inverts the sum.
 fn all_at_once() -> Known {
     let mut information = SMatrix::<f64, ALL, ALL>::zeros();
     let mut vector = SVector::<f64, ALL>::zeros();
@@ -129,9 +129,9 @@ fn forwards() -> Vec<Filtered> {
         .collect()
 }
 
-/// Means, covariances and cross-covariances of any two times equal those of the batch solution.
+/// Means and covariances equal those of the batch solution, and so do the cross-covariances between any two times.
 #[test]
-fn smoothing_equals_least_squares_over_all_times() {
+fn smoother_equals_batch_least_squares() {
     let known = all_at_once();
     let filtered = forwards();
     let near = |is: f64, should: f64, what: &str| {
@@ -139,7 +139,7 @@ fn smoothing_equals_least_squares_over_all_times() {
     };
     let last = filtered.last().unwrap();
     let (mut mean, mut factors) = (last.mean, last.factors);
-    // Columns of the cross-covariance between each later time's errors and the current ones.
+    // For each later time: columns of the cross-covariance between the errors at that time and the current errors.
     let unit = |m: usize| core::array::from_fn(|i| if i == m { 1.0 } else { 0.0 });
     let mut later = vec![(TIMES - 1, core::array::from_fn::<[f64; N], N, _>(|m| factors.along(&unit(m))))];
     for time in (0..TIMES - 1).rev() {
@@ -166,11 +166,11 @@ fn smoothing_equals_least_squares_over_all_times() {
     }
 }
 
-/// Near-exact measurements follow the step on a poor prior, with and without process noise.
+/// A poor prior is followed by a step and near-exact measurements, with and without process noise.
 ///
-/// No variance becomes negative, and none grows.
+/// No variance becomes negative, and no variance grows.
 #[test]
-fn smoothed_variances_stay_positive_and_never_grow() {
+fn smoothed_variances_are_never_negative_and_never_grow() {
     let before = Factors::independent([1e8, 1e-12, 1.0]);
     for noise in [0.0, 1e-14, 1e6] {
         let mut predicted = before;
@@ -196,7 +196,7 @@ fn smoothed_variances_stay_positive_and_never_grow() {
 }
 
 #[test]
-fn steps_survive_a_round_trip_through_records() {
+fn step_encoded_as_a_record_parses_unchanged() {
     let mut state = State::at_rest(Point3::new(1.0, -2.0, 3.0), Rot::from_roll_pitch_yaw(0.1, 0.2, 0.3));
     let mut leg = Leg::default();
     let felt = InertialSample {

@@ -25,7 +25,7 @@ pub(super) struct Point {
     sd: PoseSd,
 }
 
-/// A contiguous part of the track.
+/// A part of the track without breaks.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piece {
     clock: u32,
@@ -40,7 +40,7 @@ pub struct Track {
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
-    /// Length of the filter's epochs; the track extends this far beyond its last point.
+    /// Length of the filter's epochs. The track extends this far beyond the last point of each piece.
     epoch: DurNs,
 }
 
@@ -52,7 +52,7 @@ impl Point {
 }
 
 impl Piece {
-    /// Begins a piece at these counts of points and relatives, which are in reverse order.
+    /// Begins a piece that starts after this many points and relative covariances, both in reverse order.
     pub(super) fn begin(placed: &Placed, points: usize, relatives: usize) -> Self {
         Self {
             clock: placed.clock,
@@ -68,7 +68,7 @@ impl Piece {
 }
 
 impl Track {
-    /// Builds the track from pieces, points and relatives in reverse order.
+    /// Builds the track from pieces, points and relative covariances, all in reverse order.
     pub(super) fn of_reversed(
         mut pieces: Vec<Piece>,
         mut points: Vec<Point>,
@@ -86,7 +86,7 @@ impl Track {
         Self { pieces, points, relatives, epoch }
     }
 
-    /// Number of pieces, which is the number of breaks plus one.
+    /// Number of pieces, which is one more than the number of breaks.
     pub fn pieces(&self) -> usize {
         self.pieces.len()
     }
@@ -101,16 +101,16 @@ impl Track {
         self.points.is_empty()
     }
 
-    /// Returns the fix at time `at` of the clock after it had been set back `clock` times.
+    /// Returns the fix at time `at`, read from the clock after it has been set back `clock` times.
     ///
-    /// Errors: the part that is not known well enough at that time.
+    /// Errors: the part of the fix that is too uncertain or missing at that time.
     pub fn fix(&self, clock: u32, at: MonoNs) -> Result<Fix, NoFix> {
         let begun = |piece: &&Piece| {
             piece.clock == clock && self.points_of(piece).first().is_some_and(|first| first.at <= at)
         };
         let piece = self.pieces.iter().rev().find(begun).ok_or(NoFix::Heading)?;
         let points = self.points_of(piece);
-        // The last leg is extrapolated beyond the last point.
+        // A time after the last point is extrapolated from the last two points.
         let next = points.partition_point(|point| point.at <= at).min(points.len().saturating_sub(1));
         let (before, after) = (points.get(next.saturating_sub(1)), points.get(next));
         let (before, after) = before.zip(after).ok_or(NoFix::Heading)?;
@@ -149,7 +149,7 @@ impl Track {
     }
 }
 
-/// Interpolates or extrapolates the pose by `share` from one to the other.
+/// Interpolates between two poses by `share`; extrapolates if `share` is above 1.
 fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     let turn = rotation_vector(to.attitude * from.attitude.inverse());
     Pose {
@@ -158,7 +158,7 @@ fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     }
 }
 
-/// Navigation along a given track, independent of the readings.
+/// Navigation along a given track, which uses no readings for its fixes.
 pub struct TrackNavigation {
     track: Track,
     consistency: [Option<Consistency>; MAX_SOURCES],
@@ -169,7 +169,7 @@ pub struct TrackNavigation {
 stateful!(TrackNavigation { state: clock, received; slots: consistency; fixed: track; });
 
 impl TrackNavigation {
-    /// Creates navigation along a filter's track, with the innovation statistics of the filter's sources.
+    /// Creates navigation along a track; `consistency` holds the innovation statistics of the filter's sources.
     pub fn new(track: Track, consistency: [Option<Consistency>; MAX_SOURCES]) -> Self {
         Self { track, consistency, clock: 0, received: MonoNs(0) }
     }
@@ -177,7 +177,7 @@ impl TrackNavigation {
 
 impl Navigation for TrackNavigation {
     fn update(&mut self, _: usize, _: &SensorInfo, times: Times, _: &Reading) {
-        // Clock resets are counted as in the filter.
+        // Clock resets are counted by the same rule as in the filter.
         if self.received.since(times.received) > CLOCK_JUMP {
             self.clock = self.clock.saturating_add(1);
             self.received = times.received;
@@ -190,7 +190,8 @@ impl Navigation for TrackNavigation {
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        // After the clock is set back, the fix of the first ping is requested before this method learns of the reset.
+        // After a clock reset, the first ping needs a fix before this method has received a reading with the new
+        // time.
         if self.received.since(at) > CLOCK_JUMP {
             return Err(NoFix::Heading);
         }
@@ -218,17 +219,19 @@ mod tests {
         turn * Rot::identity()
     }
 
-    /// Point after `t` s of a drive: 0.5 m/s along the tunnel, a left turn of 0.2 rad/s, and a speed that grows by
-    /// 0.1 m/s per second.
+    /// Point of a drive after `t` s. The speed along the tunnel is 0.5 m/s, and the vehicle turns left by 0.2
+    /// rad/s.
+    ///
+    /// The speed in the state grows by 0.1 m/s per second, to test its interpolation.
     fn point(t: f64, from_x_m: f64) -> Point {
         let mut state = State::at_rest(Point3::new(from_x_m + 0.5 * t, 1.0, 2.0), turned(0.2 * t));
         state.velocity_mps = Vec3::new(0.4 + 0.1 * t, 0.0, 0.0);
         Point::of(at(t), &state, &PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 })
     }
 
-    /// Track of two drives of the first clock, the second from 10 s on, and one drive after the clock was set back.
+    /// Track of three drives: from 0 s and from 10 s on the first clock, and from 1 s on the clock after a reset.
     ///
-    /// The relative covariance is known at 0 s and at 2 s.
+    /// In the first drive, the relative covariance is known at 0 s and at 2 s.
     fn track() -> Track {
         let drives =
             [(0, 0.0, vec![0.0, 1.0, 2.0]), (0, 100.0, vec![10.0, 11.0, 14.0]), (1, 200.0, vec![1.0, 2.0])];
@@ -255,16 +258,16 @@ mod tests {
         for t in [0.0, 0.25, 0.5, 1.0, 1.7, 2.0, 2.09] {
             let fix = track.fix(0, at(t)).unwrap();
             assert!((fix.speed_mps - (0.4 + 0.1 * t)).abs() < 1e-9, "{t}: {}", fix.speed_mps);
-            // The unit is ahead of the origin in the vehicle's heading.
+            // The inertial unit is ahead of the vehicle's origin, in the direction of its heading.
             let (ahead_m, aside_m) = (0.3 * math::cos(0.2 * t), 0.3 * math::sin(0.2 * t));
             let place = fix.pose.position;
             let off_m = [place.x() - (0.5 * t - ahead_m), place.y() - (1.0 - aside_m), place.z() - 2.0];
             assert!(off_m.iter().all(|off_m| off_m.abs() < 1e-9), "{t}: {place:?}");
             assert!(rotation_vector(fix.pose.attitude * turned(0.2 * t).inverse()).norm() < 1e-9, "{t}");
-            // Variances grow from 0.01 to 0.04 m^2.
+            // The relative variance grows from 0.01 to 0.04 m^2.
             let variance_m2 = 0.01 + 0.015 * t.min(2.0);
             assert!((fix.relative.sd_m(Vec3::zero()) - math::sqrt(variance_m2)).abs() < 1e-9, "{t}");
-            // Two visits whose errors are independent, at the unit's position.
+            // At the unit's position, the errors of the two visits are independent.
             let revisit_m = fix.revisit.sd_m(fix.pose.attitude * unit_at());
             assert!((revisit_m - 0.1 * math::sqrt(2.0)).abs() < 1e-9, "{t}: {revisit_m}");
         }
@@ -292,9 +295,10 @@ mod tests {
         assert_eq!((none.pieces(), none.len(), none.is_empty()), (0, 0, true));
     }
 
-    /// A clock set back by 10 s or more starts a new count; earlier times then belong to the clock before.
+    /// If the clock goes back by 10 s or more, the drive after the reset is used. Times before then belong to the
+    /// old clock.
     #[test]
-    fn clock_reset_switches_to_the_drive_after_it() {
+    fn clock_reset_selects_the_drive_after_the_reset() {
         let mut navigation = TrackNavigation::new(track(), [None; MAX_SOURCES]);
         let mut hear = |t: f64| {
             let times = Times { received: at(t), valid: at(t) };
@@ -308,9 +312,9 @@ mod tests {
         let none = -1.0;
         assert!(is(hear(1.5), [0.0, 100.0]));
         assert!(is(hear(10.6), [0.0, 100.0]));
-        assert!(is(hear(2.0), [0.0, 100.0]), "late by less than 10 s counts as the same clock");
+        assert!(is(hear(2.0), [0.0, 100.0]), "a reading less than 10 s late belongs to the same clock");
         assert!(is(hear(11.4), [0.0, 100.0]));
-        assert!(is(hear(11.6), [none, 100.0]), "a ping from 10 s ago belongs to a clock that was set back");
+        assert!(is(hear(11.6), [none, 100.0]), "a ping 10 s in the past is from another clock");
         assert!(is(hear(1.4), [200.0, none]), "the clock was set back");
     }
 }

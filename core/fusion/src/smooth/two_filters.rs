@@ -1,8 +1,8 @@
-//! A second filter beside the navigating one, whose steps are smoothed.
+//! A second filter beside the navigating one, for smoothing.
 //!
-//! A Rauch-Tung-Striebel smoother is valid for optimal gains only. The navigating filter applies wall measurements in
-//! part and so discards some correlation on purpose; a backward pass over its steps would diverge. The second filter
-//! gets the same readings, applies wall measurements in full and records the steps.
+//! A Rauch-Tung-Striebel smoother is valid for optimal gains only. The navigating filter applies only a share of
+//! each wall correction and so discards some correlation on purpose. A backward pass over its steps would diverge.
+//! The second filter gets the same readings, applies wall corrections in full and records its steps.
 
 use super::journal::Journal;
 use crate::filter::FilterNavigation;
@@ -19,9 +19,9 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
 
-/// The navigating filter together with the recorded one.
+/// Two filters: the navigating one, and one whose steps are recorded for smoothing.
 ///
-/// Its fixes and all other outputs equal those of the navigating filter alone, bit for bit.
+/// Fixes and all other outputs are bit-identical to those of the navigating filter alone.
 pub struct TwoFilterNavigation {
     navigating: FilterNavigation,
     recorded: FilterNavigation,
@@ -29,7 +29,7 @@ pub struct TwoFilterNavigation {
 
 stateful!(TwoFilterNavigation { state: navigating, recorded; });
 
-/// Creates the filter to smooth: it uses optimal gains and writes its steps to a journal.
+/// Creates a filter for smoothing, which uses optimal gains and writes its steps to a journal.
 pub fn smoothable(profile: Profile, site: Site, settings: Settings, journal: Journal) -> FilterNavigation {
     let settings = Settings { wall_share: 1.0, ..settings };
     FilterNavigation::new(profile, site, settings).with_journal(journal)

@@ -19,15 +19,15 @@ use std::ops::Range;
 use tally::{Tally, share};
 use world::{Fault, Log, Motion, Recipe};
 
-/// Dives of the ordinary test, a tenth of the full set.
+/// Seeds of the ordinary test, a tenth of the full set.
 const FEW: Range<u64> = 0..200;
-/// Dives with a velocity log, four kinds in turn.
+/// Seeds of dives with a velocity log, whose behaviour is one of four in turn.
 const WITH_LOG: Range<u64> = 0..80;
-/// Dives of a hovering vehicle.
+/// Seeds of dives with a hovering vehicle.
 const HOVERING: Range<u64> = 0..24;
 const MANY: Range<u64> = 0..2000;
 
-/// Runs the dives of a recipe on all processors; results are in the order of seeds.
+/// Runs the dives of a recipe on all processors; returns the results in order of seeds.
 fn dives(seeds: Range<u64>, recipe: fn(u64) -> Recipe) -> Vec<(Recipe, Tally)> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
     let of_thread = |thread: u64| {
@@ -42,7 +42,7 @@ fn dives(seeds: Range<u64>, recipe: fn(u64) -> Recipe) -> Vec<(Recipe, Tally)> {
     all
 }
 
-/// Whether the vehicle file declares a cable with unusually lively slack and steps of centimetres.
+/// Whether a dive without faults declares slack of up to 6 cm and has counter steps of 4 mm or more.
 fn is_lively_and_stepped(recipe: &Recipe) -> bool {
     recipe.fault == Fault::None && recipe.is_declared && recipe.slack_m <= 0.06 && recipe.quantum_m >= 0.004
 }
@@ -104,15 +104,15 @@ fn table(all: &[(Recipe, Tally)]) {
 }
 
 #[test]
-fn errors_are_within_their_sd_or_reported() {
+fn errors_are_within_5_sd_or_reported() {
     let all = dives(FEW, Recipe::of);
     table(&all);
     let silent = |is_declared: bool| {
         all.iter().filter(|(recipe, tally)| recipe.is_declared == is_declared && tally.silent > 0).count()
     };
     assert_eq!(silent(true), 0, "dives with an unreported error of over 5 sd");
-    // Two dives are silent: undeclared slack, and a wheel that sticks at 0.05 m/s. See docs/why/navigation.md,
-    // "Seeded dives".
+    // Two dives are silent: one with undeclared slack, and one with a wheel that sticks at 0.05 m/s. See
+    // docs/why/navigation.md, "Seeded dives".
     assert!(silent(false) <= 2, "{}", silent(false));
     let within = |pick: &dyn Fn(&Recipe) -> bool| share(&of(&all, pick), |tally| [tally.within, tally.fixes]);
     assert!((0.93..0.98).contains(&within(&|recipe| recipe.is_declared)));
@@ -121,7 +121,7 @@ fn errors_are_within_their_sd_or_reported() {
     assert!(unsure <= 0.08, "{unsure}");
 }
 
-/// A log that hangs, is off by a fifth or follows drifting silt makes the filter uncertain, but never wrong.
+/// A log that hangs, is wrong by a fifth or follows drifting silt may make the filter uncertain, but never wrong.
 #[test]
 fn wrong_velocity_log_causes_no_unreported_error() {
     let all = dives(WITH_LOG, Recipe::with_log);
@@ -135,7 +135,7 @@ fn wrong_velocity_log_causes_no_unreported_error() {
     assert!(unsure < 0.15, "a sound log leaves too many epochs uncertain: {unsure}");
 }
 
-/// A count that is stationary for minutes mostly belongs to a hovering vehicle.
+/// If a count is stationary for minutes, the vehicle is mostly hovering.
 #[test]
 fn hovering_vehicle_keeps_a_certain_position() {
     let all = dives(HOVERING, Recipe::hovering);
@@ -147,7 +147,7 @@ fn hovering_vehicle_keeps_a_certain_position() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn two_thousand_dives() {
+fn two_thousand_dives_are_tabulated() {
     let seeds = std::env::var("HEADRACE_DIVES").map_or(MANY, |range| {
         let (from, to) = range.split_once("..").unwrap();
         from.parse().unwrap()..to.parse().unwrap()

@@ -1,4 +1,4 @@
-//! A dive through the filter, compared with the truth.
+//! Runs a dive through the filter and compares the estimate with the truth.
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -11,14 +11,14 @@ use headrace_sensor::reading::Reading;
 
 use crate::world::{Dive, Recipe, VELOCITY_LOG, seconds, sensor};
 
-/// Settling time of the estimate, s, before which passes are not compared.
+/// Settling times of the estimate, s: errors are compared after the first, and passes after the second.
 const SETTLED_S: f64 = 10.0;
 const COMPARED_S: f64 = 20.0;
-/// Time between two passes of the heads over a place, s.
+/// Time between two passes of the heads over the same position, s.
 const PASS_S: f64 = 2.2;
-/// Errors of more standard deviations than this must be reported.
+/// Errors beyond this many standard deviations must be reported.
 const FAR_SDS: f64 = 5.0;
-/// Twice the standard deviation between passes beyond which the loop reports a doubtful position.
+/// Limit for twice the standard deviation between passes, above which the loop reports a doubtful position, m.
 ///
 /// It is a fifth of a target of 1 m.
 const DOUBTFUL_M: f64 = 0.2;
@@ -26,16 +26,17 @@ const DOUBTFUL_M: f64 = 0.2;
 /// Results of a dive.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tally {
-    /// Number of epochs, of epochs with a fix, and of those within two standard deviations.
+    /// Number of epochs, number of epochs with a fix, and number of fixes within two standard deviations.
     pub(crate) epochs: u64,
     pub(crate) fixes: u64,
     pub(crate) within: u64,
-    /// Epochs in which the position is doubtful or unknown.
+    /// Number of epochs in which the position is doubtful or unknown.
     pub(crate) unsure: u64,
-    /// Epochs with an unreported error of over five standard deviations, and the time of the first, s.
+    /// Number of epochs with an unreported error of over five standard deviations, and the time of the first one,
+    /// s.
     pub(crate) silent: u64,
     pub(crate) first_silent_s: Option<f64>,
-    /// Largest error over its standard deviation: of the chainage, and between passes.
+    /// Largest error in standard deviations: of the chainage, and between passes.
     pub(crate) worst: f64,
     pub(crate) worst_pass: f64,
     /// Largest errors of chainage and speed while there is a fix, m, m/s.
@@ -43,13 +44,13 @@ pub(crate) struct Tally {
     pub(crate) speed_off_mps: f64,
 }
 
-/// Ratio of two counts over dives.
+/// Returns the ratio of two counts, both added up over all dives.
 pub(crate) fn share(of: &[&Tally], counts: impl Fn(&Tally) -> [u64; 2]) -> f64 {
     let sums = of.iter().map(|tally| counts(tally)).fold([0, 0], |[a, b], [c, d]| [a + c, b + d]);
     sums[0] as f64 / sums[1].max(1) as f64
 }
 
-/// Runs a dive and writes a CSV to `trace`.
+/// Runs a dive, and writes a CSV to `trace` if given.
 ///
 /// Columns: time, error, standard deviation, speed, true speed, standard deviation between passes, and whether a
 /// doubt is reported.
@@ -57,7 +58,7 @@ pub(crate) fn run(recipe: Recipe, mut trace: Option<&mut String>) -> Tally {
     let dive = Dive::new(recipe);
     let mut nav = FilterNavigation::new(dive.profile.clone(), dive.site, recipe.settings());
     let (mut tally, mut last, mut errors) = (Tally::default(), None, VecDeque::new());
-    // The loop withholds repeated readings of a stuck unit or log.
+    // Like the loop, this withholds repeated readings of a stuck unit or log.
     let mut stuck = [(StuckSensor::default(), false); VELOCITY_LOG + 1];
     for (valid, source, reading) in dive.events() {
         let (stuck, hangs) = &mut stuck[source];

@@ -1,6 +1,6 @@
-//! Dives drawn from seeds: a true motion, and the readings of sensors with known errors.
+//! Dives drawn from seeds: a true motion, and readings of sensors with known errors.
 //!
-//! It shares no code with the simulator. With the filter it shares only the wall, the site and the units.
+//! It shares no code with the simulator, and only the wall, the site and the units with the filter.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -37,7 +37,7 @@ pub(crate) enum Motion {
     BackAndForth,
 }
 
-/// Source that hangs or sticks for a while.
+/// Sensor that hangs, sticks or is silent for a while.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fault {
     None,
@@ -56,14 +56,14 @@ pub(crate) enum Fault {
 /// Behaviour of the velocity log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Log {
-    /// No log.
+    /// There is no log.
     None,
     Sound,
-    /// It repeats its last reading for a while.
+    /// The log repeats its last reading for a while.
     Hangs,
-    /// It always shows a fifth too much.
+    /// The log always shows a fifth too much.
     Scaled,
-    /// For a while it follows silt that drifts at 0.15 m/s.
+    /// For a while, the log follows silt that drifts at 0.15 m/s.
     Drifts,
 }
 
@@ -91,11 +91,12 @@ pub(crate) struct Recipe {
     pub(crate) speed_mps: f64,
     pub(crate) slack_m: f64,
     pub(crate) slack_period_s: f64,
-    /// Whether the slack is one sine instead of three.
+    /// Whether the slack is a single sine instead of a sum of three.
     pub(crate) slack_is_sine: bool,
     /// Whether the vehicle file declares slack and inertial noise correctly.
     pub(crate) is_declared: bool,
-    /// 0 is as a data sheet, 1 a small vehicle's, 2 a cheap one.
+    /// Class of the inertial unit: 0 has the noise of a good data sheet, 1 is typical of a small vehicle, 2 is
+    /// cheap.
     pub(crate) imu_class: usize,
     pub(crate) motion: Motion,
     pub(crate) fault: Fault,
@@ -119,7 +120,7 @@ impl Draws {
         z ^ (z >> 31)
     }
 
-    /// Uniform between 0 and 1.
+    /// Returns a uniform number between 0 and 1.
     pub(crate) fn uniform(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -133,7 +134,7 @@ impl Draws {
         all[number.min(all.len() - 1)]
     }
 
-    /// Normal with standard deviation 1 (Box and Muller).
+    /// Returns a normal number with standard deviation 1 (Box and Muller).
     pub(crate) fn normal(&mut self) -> f64 {
         let (a, b) = (self.uniform().max(1e-300), self.uniform());
         math::sqrt(-2.0 * math::ln(a)) * math::cos(math::TAU * b)
@@ -145,7 +146,7 @@ impl Draws {
 }
 
 impl Recipe {
-    /// Returns the dive of a seed.
+    /// Returns the recipe for a seed.
     pub(crate) fn of(seed: u64) -> Self {
         let mut draws = Draws(seed.wrapping_mul(0xD134_2543_DE82_EF95));
         let log_between = |draws: &mut Draws, least: f64, most: f64| {
@@ -181,12 +182,13 @@ impl Recipe {
         }
     }
 
-    /// Returns the dive of a seed with a velocity log; sound and faulty ones alternate.
+    /// Returns the recipe for a seed, with a velocity log that is sound or has one of three faults, in turn.
     pub(crate) fn with_log(seed: u64) -> Self {
         Self { log: Log::ALL[seed as usize % Log::ALL.len()], fault: Fault::None, ..Self::of(seed) }
     }
 
-    /// Returns a dive that hovers for five minutes, with a cable as declared in the vehicle file.
+    /// Returns a recipe in which the vehicle hovers for five minutes. The vehicle file declares the cable
+    /// correctly.
     pub(crate) fn hovering(seed: u64) -> Self {
         let recipe = Self::of(seed);
         let slack_m = recipe.slack_m.min(0.06);
@@ -194,7 +196,7 @@ impl Recipe {
         Self { duration_s: 300.0, motion: Motion::ALL[seed as usize % 2], ..hovers }
     }
 
-    /// Fastest change of a slack that is one sine, m/s.
+    /// Fastest change of the slack if it is a single sine, m/s.
     pub(crate) fn slack_rate_mps(&self) -> f64 {
         self.slack_m * math::TAU / self.slack_period_s
     }
@@ -228,22 +230,22 @@ impl Recipe {
     }
 }
 
-/// Adds a source's readings: period and phase, s, number, and its reading at a time, s.
+/// Function that adds the readings of a source. Inputs: period, s, phase, s, source, and its reading at a time, s.
 type Every<'a> = dyn FnMut(f64, f64, usize, &mut dyn FnMut(f64) -> Option<Reading>) + 'a;
 
-/// A sum of sines: amplitude, angular frequency, phase.
+/// A sum of sines, each with amplitude, angular frequency and phase.
 type Sines = Vec<(f64, f64, f64)>;
 
 fn value(sines: &Sines, t: f64) -> f64 {
     sines.iter().map(|(a, w, p)| a * math::sin(w * t + p)).sum()
 }
 
-/// A dive: the truth of a recipe.
+/// A dive with the true motion that its recipe gives.
 pub(crate) struct Dive {
     pub(crate) recipe: Recipe,
     pub(crate) profile: Profile,
     pub(crate) site: Site,
-    /// Distance along the tunnel in steps of [`STEP_S`], m.
+    /// Distance along the tunnel at times [`STEP_S`] apart, m.
     way_m: Vec<f64>,
     slack: Sines,
     swaying: [Sines; 5],
@@ -289,7 +291,7 @@ impl Dive {
         Self { recipe, profile, site, way_m, slack, swaying, biases, wander, tilts }
     }
 
-    /// Chainage of the body, m.
+    /// Returns the chainage of the body, m.
     pub(crate) fn chainage_m(&self, t: f64) -> f64 {
         let place = (t.max(0.0) / STEP_S).min((self.way_m.len() - 2) as f64);
         let before = place as usize;
@@ -317,7 +319,7 @@ impl Dive {
         (unit(t + H_S) - unit(t - H_S)).scaled(0.5 / H_S)
     }
 
-    /// All readings, in order of time.
+    /// Returns all readings, in order of time.
     pub(crate) fn events(&self) -> Vec<(MonoNs, usize, Reading)> {
         let mut events = Vec::new();
         let mut every =
@@ -440,7 +442,7 @@ impl Dive {
         }
         let payout_m = self.chainage_m(t) + value(&self.slack, t);
         let (stuck_m, lost_m) = stuck.get();
-        // A wheel that was stuck has lost that much for good.
+        // A wheel that was stuck never counts the distance that it has missed.
         let shown_m = if self.is_faulty(t, Fault::CableSticks) {
             stuck.set((stuck_m, payout_m - stuck_m));
             stuck_m
@@ -452,7 +454,7 @@ impl Dive {
         let steps = shown_m / quantum_m;
         let whole = if self.recipe.floors { math::floor_to_i64(steps) } else { math::round_to_i64(steps) };
         let resolution_m = if self.recipe.states_quantum { quantum_m } else { 5e-4 };
-        // A fine-stepped converter rounds the counts of a coarse wheel.
+        // The wheel counts in coarse steps, and the converter rounds these counts to fine steps.
         let length_m = math::round_to_i64(whole as f64 * quantum_m / resolution_m) as f64 * resolution_m;
         Some(Reading::TetherLength(TetherLength { length_m, resolution_m, restart: None }))
     }
@@ -491,7 +493,7 @@ impl Dive {
     }
 }
 
-/// Distance along the tunnel in steps of [`STEP_S`], m.
+/// Returns the distance along the tunnel at times [`STEP_S`] apart, m.
 fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
     let steps = (recipe.duration_s / STEP_S) as usize + 4;
     let speed = recipe.speed_mps;
@@ -523,7 +525,7 @@ fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
             }
         }
     };
-    // Speed follows the demanded one with two lags of 0.5 s.
+    // The speed follows the demanded speed with two lags of 0.5 s each.
     let (mut first, mut second, mut x) = (0.0, 0.0, 0.0);
     let mut way_m = Vec::with_capacity(steps);
     for k in 0..steps {
@@ -536,7 +538,7 @@ fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
     way_m
 }
 
-/// The rotation vector of a small rotation.
+/// Returns the rotation vector of a small rotation.
 fn log<To: Copy>(rotation: Rot<To, To>) -> Vec3<To> {
     let [w, x, y, z] = rotation.wxyz();
     let sign = if w < 0.0 { -2.0 } else { 2.0 };

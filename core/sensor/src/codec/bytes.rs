@@ -1,19 +1,19 @@
 //! A byte string of bounded length without heap allocation.
 
-/// Up to `N` bytes. Unused bytes are zero, so that equal values have equal contents.
+/// Up to `N` bytes. Unused bytes are zero, so that equal byte strings compare as equal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Bytes<const N: usize> {
     bytes: [u8; N],
     len: usize,
 }
 
-/// The bytes do not fit.
+/// Error: the bytes do not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("storing {len} bytes; at most {max} are allowed")]
 pub struct TooLong {
-    /// Total length needed.
+    /// Required length, bytes.
     pub len: usize,
-    /// Capacity.
+    /// Capacity, bytes.
     pub max: usize,
 }
 
@@ -26,7 +26,7 @@ impl<const N: usize> Default for Bytes<N> {
 impl<const N: usize> Bytes<N> {
     /// Creates a copy of `bytes`.
     ///
-    /// Errors: more than `N`.
+    /// Errors: `bytes` has more than `N` bytes.
     pub fn new(bytes: &[u8]) -> Result<Self, TooLong> {
         let mut new = Self::default();
         new.extend(bytes)?;
@@ -35,7 +35,7 @@ impl<const N: usize> Bytes<N> {
 
     /// Appends `bytes`.
     ///
-    /// Errors: they do not fit; nothing is appended.
+    /// Errors: the bytes do not fit; then none of them is appended.
     pub fn extend(&mut self, bytes: &[u8]) -> Result<(), TooLong> {
         let len = self.len + bytes.len();
         let free = self.bytes.get_mut(self.len..len).ok_or(TooLong { len, max: N })?;
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn oversized_input_is_rejected_whole() {
+    fn oversized_input_is_rejected_and_appends_nothing() {
         let mut bytes = Bytes::<4>::new(&[1, 2, 3]).unwrap();
         assert_eq!(bytes.extend(&[4, 5]), Err(TooLong { len: 5, max: 4 }));
         assert_eq!(bytes, Bytes::new(&[1, 2, 3]).unwrap());

@@ -1,4 +1,4 @@
-//! The contract of every codec, as a macro that generates its tests.
+//! The contract of all codecs, as a macro that generates tests of one codec.
 //!
 //! Enable the feature `contract` in a plugin's dev-dependencies and call [`codec_contract!`](crate::codec_contract)
 //! once per codec.
@@ -10,10 +10,10 @@ use super::Codec;
 /// Seed of the contract's random values; arbitrary.
 const SEED: u64 = 881;
 
-/// Proptest configuration of the contract's tests: the same values on every run.
+/// Proptest configuration of the contract's tests, which draw the same values on every run.
 ///
-/// Garbage sometimes passes a weak checksum by chance, and the test then fails although the codec is correct. With a
-/// fixed seed this happens never or always, and a failure is reproducible without a regression file. Set
+/// Garbage sometimes passes a weak checksum by chance, and the test then fails although the codec is correct. With
+/// a fixed seed, this happens on every run or on none, and a failure is reproducible without a regression file. Set
 /// `PROPTEST_RNG_SEED` to try other values.
 pub fn config() -> Config {
     let from_environment = Config::default();
@@ -24,7 +24,8 @@ pub fn config() -> Config {
     Config { rng_seed, failure_persistence: None, ..from_environment }
 }
 
-/// Decodes `bytes` pushed in pieces of the given lengths (the last takes the rest), without a flush.
+/// Decodes `bytes` pushed in pieces of the given lengths, without a flush. The last piece contains the remaining
+/// bytes.
 pub fn decode_pieces<C: Codec>(codec: &mut C, bytes: &[u8], pieces: &[usize]) -> Vec<C::Value> {
     let mut values = Vec::new();
     let mut rest = bytes;
@@ -39,14 +40,14 @@ pub fn decode_pieces<C: Codec>(codec: &mut C, bytes: &[u8], pieces: &[usize]) ->
     values
 }
 
-/// Decodes `bytes` in one piece and flushes.
+/// Decodes `bytes` pushed in one piece, then flushes.
 pub fn decode_all<C: Codec>(codec: &mut C, bytes: &[u8]) -> Vec<C::Value> {
     let mut values = decode_pieces(codec, bytes, &[]);
     codec.flush(&mut |value| values.push(value));
     values
 }
 
-/// Decodes garbage followed by a good frame, which must be the last value.
+/// Decodes garbage followed by a good frame, whose value must come last.
 pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8]) -> Vec<C::Value> {
     let mut values = Vec::new();
     codec.push(garbage, &mut |value| values.push(value));
@@ -58,14 +59,14 @@ pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8
     values
 }
 
-/// Whether all bytes are exactly one good frame.
+/// Whether `bytes` is exactly one good frame.
 fn is_one_frame<C: Codec>(codec: &mut C, bytes: &[u8]) -> bool {
     let values = decode_all(codec, bytes);
     let counts = codec.counts();
     values.len() == 1 && counts.bad_frames == 0 && counts.skipped_bytes == 0
 }
 
-/// Sets two neighbouring bytes so that `bytes` passes as one frame, if any values do.
+/// Sets the two bytes from `at` on so that `bytes` passes as one frame; returns `false` if no values do.
 fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) -> bool {
     let Some(before) = bytes.get(at..at + 2).map(<[u8]>::to_vec) else { return false };
     if bytes.len() > MOST_MATCHED {
@@ -81,9 +82,9 @@ fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) ->
     false
 }
 
-/// Positions in a frame to corrupt, each with the amount to add to its byte; the same on every run.
+/// Positions in a frame to corrupt, each with the mask that is XORed into the byte; the same on every run.
 ///
-/// An amount of one mostly keeps a digit a digit.
+/// A mask of one mostly turns a digit into another digit.
 fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
     const TURNS: [u8; 6] = [0x5B, 0x80, 0x24, 0xFF, 0x11, 0xC2];
     (0..12_usize).map(move |k| {
@@ -91,12 +92,13 @@ fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
     })
 }
 
-/// Maximum frame length for this test. Longer frames have no checksum, and trying all values of two bytes takes long.
+/// Maximum length of frames to try, because trying all values of two bytes takes long. Longer frames have no
+/// checksum.
 const MOST_MATCHED: usize = 100;
 
-/// Returns wrong frames that pass by chance.
+/// Returns corrupted frames that pass by chance.
 ///
-/// One byte of a good frame is changed, and its checksum, if any, matches.
+/// One byte of a good frame is changed, and its checksum, if any, is changed to match.
 pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let wrong = attempts(frame.len()).filter_map(|(at, turn)| {
         let mut wrong = frame.to_vec();
@@ -112,7 +114,7 @@ pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<V
     wrong.collect()
 }
 
-/// Returns truncated frames that pass together with the first bytes of the good frame after them.
+/// Returns truncated frames that, with the first bytes of the good frame after them, pass as one frame.
 pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let len = frame.len();
     let cut = (2..len).rev().step_by(len.div_ceil(6)).filter_map(|keep| {
@@ -124,13 +126,16 @@ pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> V
 
 /// Generates a module of tests that check a codec against its contract.
 ///
-/// `codec` is an expression that creates a new codec, `values` a proptest strategy of all values that can be encoded,
-/// `encode` a function from `&Value` to its bytes, and `frames` one or more good frames as the device sends them.
-/// On a byte stream, only the protocol's framing distinguishes a frame from garbage. If the last bytes of the garbage
-/// and the first of the frame form a valid frame, no decoder can do better. The macro's garbage is random, so the
-/// probability of that is the protocol's. The values come from one fixed seed (see
-/// [`contract::config`](crate::codec::contract::config)). A chance match therefore appears when a test or strategy
-/// changes, not at random runs.
+/// - `codec` is an expression that creates a new codec.
+/// - `values` is a proptest strategy of all values that can be encoded.
+/// - `encode` is a function from `&Value` to its bytes.
+/// - `frames` are one or more good frames as the device sends them.
+///
+/// On a byte stream, only the protocol's framing distinguishes a frame from garbage. If the last bytes of the
+/// garbage and the first bytes of the frame form a valid frame, every decoder loses the real frame. The macro's
+/// garbage is random, so the protocol determines the probability of such a match. All values come from one fixed
+/// seed (see [`contract::config`](crate::codec::contract::config)). A chance match therefore appears only after a
+/// test or strategy has changed, and then on every run.
 #[macro_export]
 macro_rules! codec_contract {
     ($module:ident, codec: $codec:expr, values: $values:expr, encode: $encode:expr, frames: $frames:expr $(,)?) => {
@@ -148,7 +153,7 @@ macro_rules! codec_contract {
                 #![proptest_config($crate::codec::contract::config())]
 
                 #[test]
-                fn any_bytes_are_accounted_for_without_panic(
+                fn any_bytes_cause_no_panic_and_are_released_by_flush(
                     bytes in proptest::collection::vec(any::<u8>(), 0..2000),
                     pieces in proptest::collection::vec(0usize..40, 0..60),
                 ) {
@@ -203,13 +208,13 @@ macro_rules! codec_contract {
                 }
 
                 #[test]
-                fn encode_then_decode_is_the_identity(value in $values) {
+                fn decoding_an_encoded_value_returns_it(value in $values) {
                     prop_assert_eq!(decode_all(&mut $codec, &($encode)(&value)), vec![value]);
                 }
             }
 
             #[test]
-            fn given_frames_decode_split_at_every_byte() {
+            fn frame_split_at_any_byte_gives_the_same_value() {
                 for frame in $frames {
                     let frame: &[u8] = frame.as_ref();
                     let expected = decode_all(&mut $codec, frame);
@@ -220,9 +225,9 @@ macro_rules! codec_contract {
                 }
             }
 
-            /// A wrong frame with a matching checksum is a value like any other, and costs no later frame.
+            /// A corrupted frame with a matching checksum decodes to a value. No later frame is lost.
             #[test]
-            fn chance_checksum_match_costs_no_other_frame() {
+            fn corrupted_frame_with_matching_checksum_hides_no_other_frame() {
                 let mut tried = 0;
                 for frame in $frames {
                     let frame: &[u8] = frame.as_ref();
@@ -238,9 +243,10 @@ macro_rules! codec_contract {
                 assert!(tried > 0);
             }
 
-            /// A truncated frame with a chance match costs only the frame that the next bytes belong to.
+            /// A truncated frame may match together with the next bytes. Then only the frame with those bytes is
+            /// lost.
             #[test]
-            fn chance_match_into_the_next_frame_costs_only_that_frame() {
+            fn truncated_frame_that_matches_with_the_next_hides_only_that_one() {
                 for frame in $frames {
                     let frame: &[u8] = frame.as_ref();
                     for cut in matching_into_the_next(&|| $codec, frame) {

@@ -1,23 +1,23 @@
-//! Framing with rescanning, shared by all codecs.
+//! Framing that rescans after a failed candidate, shared by all codecs.
 
 use super::{Codec, CodecCounts};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
-/// Verdict on a frame candidate at the start of the held bytes.
+/// Verdict on the bytes from the start of a frame candidate on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// No frame begins here.
     NotAStart,
-    /// A frame may begin here; at least this many bytes in total are needed to decide.
+    /// A frame may begin here; a decision needs at least this many bytes in total.
     Need(usize),
     /// A complete frame of this many bytes.
     Frame(usize),
-    /// A start marker not followed by a valid frame.
+    /// A start marker without a valid frame after it.
     Bad,
 }
 
 impl Verdict {
-    /// Verdict on a candidate of `len` bytes; `is_good` checks it once it is complete.
+    /// Returns the verdict on a candidate of `len` bytes; `is_good` checks the candidate once it is complete.
     pub fn on(front: &[u8], len: usize, is_good: impl FnOnce(&[u8]) -> bool) -> Self {
         match front.get(..len) {
             None => Self::Need(len),
@@ -35,26 +35,28 @@ pub trait Framing: Copy {
     /// See [`Codec::WHOLE_MESSAGES`].
     const WHOLE_MESSAGES: bool = false;
 
-    /// Verdict on the start of `front`, which has at least one byte. Depends on these bytes alone.
+    /// Returns the verdict on a frame at the start of `front`, which has at least one byte; depends on `front`
+    /// alone.
     fn judge(&self, front: &[u8]) -> Verdict;
 
-    /// Returns the value of a frame accepted by [`Framing::judge`]; `None` if it carries nothing useful.
+    /// Returns the value of a frame accepted by [`Framing::judge`]; `None` if the frame carries nothing useful.
     fn read(&self, frame: &[u8]) -> Option<Self::Value>;
 }
 
 /// Codec of a [`Framing`]: keeps an incomplete frame between pushes and finds frames in arbitrary input.
 ///
-/// `N` is the maximum frame length; a candidate that needs more is bad. On a byte stream, scanning resumes at the
-/// second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame is
-/// skipped without counting a bad frame. In a whole message, anything other than frames makes the rest of the message
-/// one bad frame, and apparent frames in that rest are ignored.
+/// `N` is the maximum frame length; a candidate that needs more bytes is bad. On a byte stream, scanning resumes at
+/// the second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame
+/// is skipped, and does not count as a bad frame. In a whole message, the first bytes that are no frame make the
+/// rest of the message one bad frame. Apparent frames in that rest are ignored.
+///
 /// Allocates: never.
 #[derive(Debug, Clone)]
 pub struct Framed<F, const N: usize> {
     framing: F,
     held: [u8; N],
     len: usize,
-    /// Whether the current message is bad, so that the rest of it is skipped.
+    /// Whether the current message is bad, so that its remaining bytes are skipped.
     astray: bool,
     counts: CodecCounts,
 }
@@ -66,7 +68,7 @@ impl<F: Default, const N: usize> Default for Framed<F, N> {
 }
 
 impl<F, const N: usize> Framed<F, N> {
-    /// Creates a codec without input so far.
+    /// Creates a codec that has received no bytes yet.
     pub fn new(framing: F) -> Self {
         Self { framing, held: [0; N], len: 0, astray: false, counts: CodecCounts::default() }
     }
@@ -79,7 +81,7 @@ impl<F, const N: usize> Framed<F, N> {
     }
 }
 
-/// The incomplete frame and the counters.
+/// Saves the incomplete frame and the counters.
 impl<F, const N: usize> Stateful for Framed<F, N> {
     fn save(&self, to: &mut Saver) {
         to.value(&(self.astray, self.counts));
@@ -121,11 +123,11 @@ impl<F: Framing, const N: usize> Framed<F, N> {
         self.astray = false;
     }
 
-    /// Handles a silence, before `next` is pushed: drops held bytes only if they are provably a false start.
+    /// Handles a silence, before `next` is pushed. Drops held bytes only if they are provably a false start.
     ///
-    /// The proof is a whole frame inside them or at the start of `next`. Otherwise they are kept, however long the
-    /// rest of the frame takes, because silence alone does not distinguish a false start from a slow line. Frames go
-    /// to `take` as in [`Framed::push_frames`]. In message mode, the message ends with the silence.
+    /// A whole frame inside the held bytes or at the start of `next` is the proof. Without it, the held bytes are
+    /// kept, however late the rest of the frame comes, because a slow line looks the same as a false start. Frames
+    /// go to `take` as in [`Framed::push_frames`]. In message mode, the message ends with the silence.
     pub fn settle_frames(&mut self, next: &[u8], mut take: impl FnMut(&[u8], usize)) {
         if F::WHOLE_MESSAGES || self.is_whole_frame(next) {
             return self.flush_frames(take);
@@ -143,7 +145,7 @@ impl<F: Framing, const N: usize> Framed<F, N> {
             && matches!(self.framing.judge(front), Verdict::Frame(n) if (1..=front.len().min(N)).contains(&n))
     }
 
-    /// Takes frames from the held bytes; candidates that begin before `give_up_before` are not waited for.
+    /// Takes frames from the held bytes. Gives up incomplete candidates that begin before `give_up_before`.
     fn scan(&mut self, later: usize, give_up_before: usize, take: &mut impl FnMut(&[u8], usize)) {
         let mut start = 0;
         while start < self.len {
@@ -198,7 +200,7 @@ impl<F: Framing, const N: usize> Codec for Framed<F, N> {
 pub(super) mod tests {
     use super::*;
 
-    /// Frames: 0xA5, length n up to 5, n bytes, 0x5A.
+    /// Framing for tests: 0xA5, length n up to 5, n bytes, 0x5A.
     #[derive(Debug, Clone, Copy, Default)]
     pub(crate) struct Marked<const WHOLE_MESSAGES: bool>;
 
@@ -230,14 +232,14 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn frame_inside_a_false_one_is_found() {
+    fn frame_inside_a_false_frame_is_found() {
         let mut codec = Framed::<Marked<false>, 8>::default();
         assert_eq!(pushed(&mut codec, &[0xA5, 5, 0xA5, 1, 7, 0x5A, 0, 0]), [[7]]);
         assert_eq!(codec.counts(), CodecCounts { good_frames: 1, bad_frames: 1, skipped_bytes: 4 });
     }
 
     #[test]
-    fn silence_releases_a_frame_behind_a_false_start() {
+    fn flush_releases_a_frame_behind_a_false_start() {
         let mut codec = Framed::<Marked<false>, 8>::default();
         assert!(pushed(&mut codec, &[0xA5, 5, 0xA5, 0, 0x5A]).is_empty());
         assert_eq!(codec.held_bytes(), 5);
@@ -247,7 +249,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn each_frame_has_the_distance_to_its_start() {
+    fn distance_from_frame_start_to_input_end_is_reported() {
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut behind = Vec::new();
         codec.push_frames(&[0, 0xA5, 5, 0xA5], |_, back| behind.push(back));
@@ -278,7 +280,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn truncated_message_contains_no_other() {
+    fn frame_inside_a_truncated_message_is_ignored() {
         let mut codec = Framed::<Marked<true>, 8>::default();
         assert!(pushed(&mut codec, &[0xA5, 5, 0xA5, 0, 0x5A]).is_empty());
         codec.flush(&mut |value| panic!("{value:?}"));

@@ -11,8 +11,10 @@ const MAX_PARTS: usize = 32;
 
 /// Stamps each frame of a byte stream with the receive time of the packet that contained its first byte.
 ///
-/// Earlier bytes may still be held, and the last byte may come at any time. Beyond `MAX_PARTS` packets, those before
-/// the newest are merged into one. A frame that begins among them, after a false start, is then stamped too early.
+/// A frame may begin in an earlier packet than the one that completes it, at any time before. If the held bytes
+/// come from more than `MAX_PARTS` packets, the latest ones before the newest are merged into one. A frame that
+/// begins in a merged packet, after a false start, is then stamped too early.
+///
 /// Allocates: never.
 #[derive(Debug, Clone)]
 pub struct LineClock {
@@ -34,7 +36,7 @@ stateful!(LineClock { state: last, len; slots: parts; fixed: silence; });
 impl LineClock {
     /// Creates a clock; `silence` is the longest usual gap within a frame.
     ///
-    /// After a longer gap between two packets, it looks for a false start that holds frames back
+    /// After a longer gap between two packets, the clock looks for a false start that holds frames back
     /// ([`Framed::settle_frames`]).
     pub fn new(silence: DurNs) -> Self {
         Self { silence, last: MonoNs(0), parts: [Part::default(); MAX_PARTS], len: 0 }
@@ -73,7 +75,7 @@ impl LineClock {
         }
     }
 
-    /// Returns the receive time of the byte `behind` bytes before the end, that byte included.
+    /// Returns the receive time of the first of the last `behind` bytes.
     fn received(&self, behind: usize) -> MonoNs {
         let mut after = 0;
         let holds = |part: &&Part| {
@@ -83,7 +85,7 @@ impl LineClock {
         self.parts().iter().rev().find(holds).map_or(self.last, |part| part.received)
     }
 
-    /// Drops packets before the last `held` bytes.
+    /// Drops the packets that contain none of the last `held` bytes.
     fn keep(&mut self, held: usize) {
         let mut after = 0;
         let needed = self.parts().iter().rev().take_while(|part| {
@@ -102,7 +104,7 @@ mod tests {
     use super::super::framed::tests::Marked;
     use super::*;
 
-    /// Receive times of the frames in `packets`, sent one per millisecond.
+    /// Returns the receive times of the frames in `packets`, which arrive one per millisecond from 1 ms on.
     fn times(clock: &mut LineClock, packets: &[&[u8]]) -> Vec<u64> {
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut times = Vec::new();
@@ -124,13 +126,13 @@ mod tests {
     }
 
     #[test]
-    fn frame_behind_a_false_start_keeps_its_time() {
+    fn frame_behind_a_false_start_has_the_time_of_its_first_byte() {
         let packets: [&[u8]; 4] = [&[0xA5, 5], &[0xA5], &[1, 7], &[0x5A, 0, 0]];
         assert_eq!(times(&mut clock(5), &packets), [2]);
     }
 
     #[test]
-    fn silence_releases_a_frame_with_its_own_time() {
+    fn frame_released_by_silence_has_the_time_of_its_first_byte() {
         let false_start = [&[0xA5, 5][..], &[0xA5, 0, 0x5A]];
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut clock = clock(5);
@@ -139,13 +141,13 @@ mod tests {
         }
         let mut times = Vec::new();
         let after = MonoNs(2) + DurNs::from_millis(5);
-        clock.push(&mut codec, after, &[], |at, _| panic!("a frame before its time, at {at:?}"));
+        clock.push(&mut codec, after, &[], |at, _| panic!("the frame was released too early, at {at:?}"));
         clock.push(&mut codec, after + DurNs(5_000_001), &[0xA5, 0, 0x5A], |at, _| times.push(at));
         assert_eq!(times, [MonoNs(2), after + DurNs(5_000_001)]);
     }
 
     #[test]
-    fn any_number_of_packets_is_handled() {
+    fn more_packets_than_tracked_are_merged() {
         let mut clock = clock(5);
         let mut packets: Vec<&[u8]> = vec![&[]; 100];
         packets[0] = &[0xA5, 5];

@@ -1,9 +1,8 @@
-//! Codecs between a device's bytes and its values, without I/O, and their contract.
+//! Codecs between a device's bytes and its values, without I/O, and the contract that every codec is tested
+//! against.
 //!
-//! Every codec is tested against the contract.
-//!
-//! A codec is a pure state machine. It takes bytes in any pieces that a port delivers and emits values. It reads no
-//! clock, does no I/O, and holds at most one frame of bytes. Ports are a separate layer.
+//! A codec is a pure state machine. It takes bytes in pieces of any size and emits values. It reads no clock, does
+//! no I/O, and holds at most one frame of bytes. Ports are a separate layer.
 
 mod bytes;
 #[cfg(feature = "contract")]
@@ -16,12 +15,12 @@ pub use framed::{Framed, Framing, Verdict};
 pub use line_clock::LineClock;
 use serde::{Deserialize, Serialize};
 
-/// Counters of a codec. Every byte pushed is in exactly one of: a good frame, `skipped_bytes`, or still held.
+/// Counters of a codec. Every pushed byte belongs to a good frame, counts in `skipped_bytes`, or is still held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CodecCounts {
     /// Complete, valid frames.
     pub good_frames: u64,
-    /// Candidates with a start marker that failed: checksum, terminator, length or range.
+    /// Candidates that begin with a start marker, but fail by checksum, terminator, length or range.
     pub bad_frames: u64,
     /// Bytes that belong to no good frame.
     pub skipped_bytes: u64,
@@ -39,23 +38,23 @@ pub trait Codec {
     /// Value of one frame, in the protocol's units.
     type Value: Clone + PartialEq + core::fmt::Debug;
 
-    /// Maximum frame length; also the bound on the bytes held between two pushes.
+    /// Maximum frame length; also the maximum number of bytes held between two pushes.
     const MAX_FRAME_BYTES: usize;
 
     /// Whether the transport delivers whole messages (CAN frames, HID reports, I2C transactions).
     ///
-    /// Garbage is then a separate message, and the port calls [`Codec::flush`] after each. On a byte stream, garbage
-    /// may directly precede a frame.
+    /// If so, the port calls [`Codec::flush`] after each message, and garbage is a message of its own. On a byte
+    /// stream, garbage may directly precede a frame.
     const WHOLE_MESSAGES: bool;
 
-    /// Takes received bytes and calls `sink` for each value completed, in order.
+    /// Takes received bytes and calls `sink` for each completed value, in order.
     ///
     /// Allocates: never.
     fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Self::Value));
 
-    /// Signals the end of a message, or a silence longer than the pause allowed within a frame.
+    /// Signals the end of a message, or a silence that is longer than any pause within a frame.
     ///
-    /// An incomplete frame is given up, and its bytes are rescanned.
+    /// Gives up an incomplete frame and rescans its bytes.
     fn flush(&mut self, sink: &mut dyn FnMut(Self::Value));
 
     /// Counters so far.

@@ -1,9 +1,10 @@
-//! Corrected arrival times of late samples, from the device's own clock.
+//! Corrected times of samples that arrive late, from the device's own clock.
 //!
-//! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms then
-//! have the same receive time. A jerk in one of them would count for the whole gap before it. The device's stamps
-//! separate the samples: receive time less device time is usually near its minimum, and any excess is the delay of
-//! the sample. Receive times still define the order; only the time of validity is corrected.
+//! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms
+//! then have the same receive time. The first of them would count for the whole gap before the burst, even if it
+//! measured a short jerk. The device's stamps separate the samples. Receive time less device time is usually near
+//! its minimum, and any excess is the delay of the sample. Receive times still define the order; only the time of
+//! validity is corrected.
 
 use core::cmp::Ordering;
 
@@ -13,31 +14,32 @@ use super::{ClockReport, DeviceClock};
 use crate::reading::Reading;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Rate at which the usual delay follows later stamps, per second: faster than clocks drift apart.
+/// Rate at which the usual delay rises while stamps are later than usual, per second. Clocks drift apart more
+/// slowly.
 ///
-/// It follows earlier stamps faster by the factor below, and so settles at the delay that one stamp in ten undercuts.
-/// A garbled stamp has no larger effect than any other.
+/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` as fast. It so settles at the delay that
+/// one stamp in ten undercuts. A garbled stamp has no larger effect than any other.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
-/// Longest time between stamps that counts, s.
+/// Maximum time between stamps that counts in a change of the usual delay, s.
 const MOST_BETWEEN_S: f64 = 0.1;
-/// Minimum delay that is corrected.
-///
-/// Smaller ones come from ticks and from sending a sample's frames one after the other.
+/// Minimum delay that is corrected. Smaller delays come from ticks and from the time to send the frames of a
+/// sample.
 const LEAST: DurNs = DurNs(1_000_000);
-/// Maximum delay that is corrected. A stopped clock looks late, too, and navigation does not wait longer for samples.
+/// Maximum delay that is corrected. A stopped clock also looks late, and navigation waits no longer than this for
+/// samples.
 const MOST: DurNs = DurNs(150_000_000);
 
-/// Times of the samples of a device with a clock. Allocates: never.
+/// Corrects the times of the samples of a device with a clock. Allocates: never.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SampleTimes {
     clock: DeviceClock,
     delay: UsualDelay,
     stamped: Option<Stamped>,
     last_reading: Option<MonoNs>,
-    /// Count of readings just after a stamp, less stamps just after a reading.
+    /// Number of samples whose stamp came first, less number of samples whose stamp came last; clamped.
     ///
-    /// Some units send the stamp last.
+    /// The count is needed because some units send the stamp after the readings.
     leads: i8,
 }
 
@@ -49,9 +51,9 @@ struct Stamped {
     told: [bool; KINDS],
 }
 
-/// Number of kinds: rate, force, attitude. A stamp belongs to the first of each that follows it.
+/// Number of kinds: rate, force, attitude. A stamp belongs to the first reading of each kind after it.
 const KINDS: usize = 3;
-/// Minimum lead count for the stamp to count as leading, and the limit of the count.
+/// Minimum of `leads` at which stamps count as coming first, and the limit at which `leads` is clamped.
 const SURE_LEADS: i8 = 8;
 const MOST_LEADS: i8 = 16;
 
@@ -64,7 +66,7 @@ struct UsualDelay {
 }
 
 impl SampleTimes {
-    /// Creates it for a clock of `bits` bits (1 to 64) with ticks of length `tick`, as [`DeviceClock::new`].
+    /// Creates it for a clock of `bits` bits (1 to 64) with ticks of length `tick`, as in [`DeviceClock::new`].
     pub fn new(bits: u32, tick: DurNs) -> Self {
         Self {
             clock: DeviceClock::new(bits, tick),
@@ -82,10 +84,10 @@ impl SampleTimes {
         self.stamped = Some(Stamped { received, usual: received - late, told: [false; KINDS] });
     }
 
-    /// Returns the receive time that a reading would have had without its sample's delay.
+    /// Returns the receive time that a reading would have had without the delay of its sample.
     ///
-    /// Returns `received` for a reading without a stamp, one with a usual delay, or one later than a queue explains.
-    /// The same holds for a unit that sends its stamps after its readings.
+    /// Returns `received` for a reading without a stamp, with a usual delay, or with a delay that no queue
+    /// explains. The same holds for all readings of a unit that sends its stamps after its readings.
     pub fn arrival(&mut self, reading: &Reading, received: MonoNs) -> MonoNs {
         let kind = match reading {
             Reading::AngularRate(_) => 0,
@@ -96,7 +98,7 @@ impl SampleTimes {
         let Some(stamped) = &mut self.stamped else { return received };
         let last = self.last_reading.replace(received);
         if let Some(last) = last.filter(|_| stamped.told == [false; KINDS]) {
-            // Equal receive times within a burst are no evidence.
+            // Within a burst, receive times are equal and do not show whether the stamp came first.
             let lead = match received.since(stamped.received).cmp(&stamped.received.since(last)) {
                 Ordering::Less => 1,
                 Ordering::Equal => 0,
@@ -118,7 +120,7 @@ impl SampleTimes {
 }
 
 impl UsualDelay {
-    /// Returns the delay of a stamp beyond the usual one; zero for the first of a clock epoch.
+    /// Returns the delay of a stamp beyond the usual delay; zero for the first stamp of a clock epoch.
     fn late(&mut self, device: DurNs, received: MonoNs) -> DurNs {
         let delay = received.since(MonoNs(0)) - device;
         let is_first = device <= DurNs::ZERO || device < self.device;

@@ -1,46 +1,46 @@
 //! Splits a byte stream into the device's frames.
 //!
-//! Each log message is therefore one frame, stamped with its first byte.
+//! Each log message is therefore one frame, stamped with the receive time of its first byte.
 
 use std::collections::VecDeque;
 
 use crate::codec::{Codec as _, CodecCounts, Framed, Framing};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Splits a byte stream that arrives in arbitrary pieces into frames, and passes on the bytes in between.
+/// Splits a byte stream that arrives in arbitrary parts into frames, and also passes on the bytes between frames.
 ///
-/// No byte is dropped or reordered: the pieces concatenate to the input. The frames are the same however the stream
-/// is split and whenever its parts come. Each frame has the receive time of the part with its first byte, even if its
-/// last one comes much later, as from a bridge that sends blocks.
+/// No byte is dropped or reordered: the concatenated pieces equal the input. The frames are the same however the
+/// stream is split and whenever its parts arrive. Each frame has the receive time of the part that contains its
+/// first byte. The last byte may arrive much later, for instance through a bridge that sends blocks.
 #[derive(Debug, Clone)]
 pub struct Cutter<F, const N: usize> {
     codec: Framed<F, N>,
     silence: DurNs,
     /// Receive time of the last bytes.
     last: MonoNs,
-    /// Whether the silence since then has been handled.
+    /// Whether the silence since the last bytes has been handled.
     settled: bool,
     /// Bytes that have not been passed on yet.
     pending: Vec<u8>,
-    /// Receive times of the pending bytes, each with its byte count, oldest first.
+    /// Receive time and byte count of each part of the pending bytes, oldest first.
     parts: VecDeque<(MonoNs, usize)>,
 }
 
-/// A piece of the input.
+/// A piece of the input: a frame, or bytes between frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece<'a> {
-    /// Receive time of its first byte.
+    /// Receive time of the first byte.
     pub received: MonoNs,
-    /// Its bytes.
+    /// Bytes of the piece.
     pub bytes: &'a [u8],
-    /// Whether it is a frame; otherwise it contains bytes before a frame.
+    /// Whether the piece is a frame.
     pub is_frame: bool,
 }
 
 impl<F: Framing, const N: usize> Cutter<F, N> {
     /// Creates a cutter; `silence` is the longest usual gap within a frame.
     ///
-    /// After a longer gap it looks for a false start that holds frames back ([`Framed::settle_frames`]).
+    /// After a longer gap, the cutter looks for a false start that holds frames back ([`Framed::settle_frames`]).
     pub fn new(framing: F, silence: DurNs) -> Self {
         let (pending, parts) = (Vec::with_capacity(2 * N), VecDeque::new());
         Self { codec: Framed::new(framing), silence, last: MonoNs(0), settled: true, pending, parts }
@@ -65,21 +65,21 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.hand_on(&found, take);
     }
 
-    /// Gives up an incomplete frame because the line was closed.
+    /// Gives up an incomplete frame, and passes on all pending bytes, because the line was closed.
     pub fn flush(&mut self, take: &mut dyn FnMut(Piece<'_>)) {
         let mut found = Vec::new();
         self.codec.flush_frames(|frame, behind| found.push((behind, frame.len())));
         self.hand_on(&found, take);
     }
 
-    /// Returns when to push zero bytes to resolve an incomplete frame that holds others back.
+    /// Returns when to push zero bytes, so that an incomplete frame no longer holds other frames back.
     ///
-    /// `None` if there is none.
+    /// `None` if nothing is pending, or if the silence has been handled.
     pub fn settles(&self) -> Option<MonoNs> {
         (!self.settled && !self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
     }
 
-    /// Whether these bytes alone contain a frame that is `one_of_its`.
+    /// Whether these bytes alone contain a frame that satisfies `one_of_its`.
     pub fn accepts(&self, bytes: &[u8], one_of_its: impl Fn(&[u8]) -> bool) -> bool {
         let (mut codec, mut found) = (Framed::<F, N>::new(*self.codec.framing()), false);
         codec.push_frames(bytes, |frame, _| found |= one_of_its(frame));
@@ -94,7 +94,8 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
 
     /// Passes on all pending bytes except those held by the codec.
     ///
-    /// `found` contains, for each frame, the distance of its start from the end, and its length.
+    /// `found` contains two numbers for each frame: the bytes from its start to the end of the input, and its
+    /// length.
     fn hand_on(&mut self, found: &[(usize, usize)], take: &mut dyn FnMut(Piece<'_>)) {
         let total = self.pending.len();
         let mut handed = 0;
@@ -108,7 +109,7 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.give(self.pending.len().saturating_sub(held), false, take);
     }
 
-    /// Passes on the first `count` bytes.
+    /// Passes on the first `count` pending bytes as one piece.
     fn give(&mut self, count: usize, is_frame: bool, take: &mut dyn FnMut(Piece<'_>)) {
         let count = count.min(self.pending.len());
         if count == 0 {
@@ -136,7 +137,7 @@ mod tests {
     use super::*;
     use crate::codec::Verdict;
 
-    /// Frames: 0xA5, length n up to 5, n bytes, 0x5A.
+    /// Framing for tests: 0xA5, length n up to 5, n bytes, 0x5A.
     #[derive(Debug, Clone, Copy, Default)]
     struct Marked;
 
@@ -191,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_releases_an_incomplete_frame_and_one_inside_it() {
+    fn silence_releases_an_incomplete_frame_and_the_frame_inside_it() {
         let mut cutter = cutter();
         assert!(pushed(&mut cutter, &[(1, &[0xA5, 5, 0xA5, 0, 0x5A])]).is_empty());
         assert_eq!(cutter.settles(), Some(MonoNs(52)));
@@ -201,26 +202,26 @@ mod tests {
     }
 
     #[test]
-    fn frame_completed_with_the_next_one_keeps_its_first_time() {
+    fn frame_completed_late_has_the_time_of_its_first_byte() {
         let parts: [(u64, &[u8]); 3] =
             [(1, &[0xA5, 1, 9]), (1 + 66, &[0x5A, 0xA5, 1, 8]), (1 + 2 * 66, &[0x5A, 0xA5])];
         let expected: Pieces = vec![(1, vec![0xA5, 1, 9, 0x5A], true), (67, vec![0xA5, 1, 8, 0x5A], true)];
         let mut cutter = cutter();
         assert_eq!(pushed(&mut cutter, &parts), expected);
-        // No repeated wake-ups for a frame that has begun.
+        // A frame that has begun causes no repeated wake-ups.
         assert!(pushed(&mut cutter, &[(133 + 52, &[])]).is_empty());
         assert_eq!(cutter.settles(), None);
     }
 
     #[test]
-    fn truncated_frame_yields_to_a_whole_one_after_silence() {
+    fn whole_frame_after_silence_releases_a_truncated_one() {
         let parts: [(u64, &[u8]); 2] = [(1, &[0xA5, 5, 1]), (100, &[0xA5, 0, 0x5A])];
         let expected: Pieces = vec![(1, vec![0xA5, 5, 1], false), (100, vec![0xA5, 0, 0x5A], true)];
         assert_eq!(pushed(&mut cutter(), &parts), expected);
     }
 
     #[test]
-    fn other_wake_ups_do_not_delay_the_silence() {
+    fn wake_ups_without_bytes_do_not_extend_the_silence() {
         let mut cutter = cutter();
         let lure: [(u64, &[u8]); 3] = [(1, &[0xA5, 5, 0xA5, 0, 0x5A]), (30, &[]), (51, &[])];
         assert!(pushed(&mut cutter, &lure).is_empty());
@@ -228,10 +229,10 @@ mod tests {
     }
 
     proptest! {
-        /// For any split of the input, all bytes are passed on in order, times never decrease, and the frames are the
-        /// codec's.
+        /// For any split of the input, the cutter passes on all bytes in order, and times never decrease. The
+        /// frames equal those that the codec alone finds.
         #[test]
-        fn cutter_loses_and_changes_nothing(
+        fn pieces_concatenate_to_the_input_for_any_split(
             bytes in proptest::collection::vec(prop_oneof![Just(0xA5u8), Just(0x5A), 0u8..7], 0..200),
             cuts in proptest::collection::vec(1usize..20, 1..40),
         ) {

@@ -1,10 +1,10 @@
-//! Drivers of devices that transmit unsolicited.
+//! Drivers of devices that transmit without being asked.
 
 use super::{Cutter, DeviceHealth, Driver, Wire};
 use crate::codec::Framing;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Listens to a byte stream and delivers all of it, frame by frame.
+/// Driver that only listens to a byte stream, and delivers all of it frame by frame.
 pub struct Listener<F, const N: usize> {
     cutter: Cutter<F, N>,
     silence_timeout: DurNs,
@@ -13,7 +13,8 @@ pub struct Listener<F, const N: usize> {
 impl<F: Framing, const N: usize> Listener<F, N> {
     /// Creates a listener.
     ///
-    /// `silence` is the inter-frame timeout. `silence_timeout` is the longest time between messages of a healthy device.
+    /// `silence` is the longest usual gap within a frame. `silence_timeout` is the longest gap between messages of
+    /// a healthy device.
     pub fn new(framing: F, silence: DurNs, silence_timeout: DurNs) -> Self {
         Self { cutter: Cutter::new(framing, silence), silence_timeout }
     }
@@ -51,10 +52,10 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
     }
 }
 
-/// Returns the fault of a message, if it has one.
+/// Function that returns the fault of a message; `None` for a good message of the device.
 pub type Judge = Box<dyn Fn(&[u8]) -> Option<String> + Send>;
 
-/// Listens to whole messages and delivers each one.
+/// Driver that only listens to whole messages, and delivers each of them.
 pub struct MessageListener {
     judge: Judge,
     silence_timeout: DurNs,
@@ -65,7 +66,8 @@ pub struct MessageListener {
 impl MessageListener {
     /// Creates a listener.
     ///
-    /// `judge` identifies foreign messages. `silence_timeout` is the longest time between messages of a healthy device.
+    /// `judge` finds faulty and foreign messages. `silence_timeout` is the longest gap between messages of a
+    /// healthy device.
     pub fn new(judge: Judge, silence_timeout: DurNs) -> Self {
         Self { judge, silence_timeout, good_frames: 0, complaint: None }
     }

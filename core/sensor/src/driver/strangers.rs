@@ -1,9 +1,9 @@
-//! Ignored senders on a device's line.
+//! Senders that are ignored on a device's line.
 
-/// Maximum number of senders named; beyond it the text only mentions others.
+/// Maximum number of senders that are listed by name.
 const NAMED: usize = 4;
 
-/// Count of messages from senders other than the device, and their names; bounded for any input.
+/// Names of the ignored senders, and the number of their messages. Memory is bounded for any input.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct IgnoredSenders {
     messages: u64,
@@ -12,7 +12,7 @@ pub struct IgnoredSenders {
 }
 
 impl IgnoredSenders {
-    /// Counts messages of one sender; returns true if this call names it for the first time.
+    /// Counts messages of one sender; returns true if the call adds a name to the list.
     pub fn note(&mut self, messages: u64, who: &str) -> bool {
         self.messages = self.messages.saturating_add(messages);
         if self.who.iter().any(|known| known == who) {
@@ -31,7 +31,8 @@ impl IgnoredSenders {
         self.messages
     }
 
-    /// Describes the ignored senders; `None` without any. It changes with the names, not with the count.
+    /// Describes the ignored senders; `None` if there are none. The text depends on the names, not on the number of
+    /// messages.
     pub fn words(&self) -> Option<String> {
         let more = if self.more { " and others" } else { "" };
         (!self.who.is_empty()).then(|| format!("ignored: {}{more}", self.who.join(", ")))
@@ -43,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_senders_are_counted_and_the_first_few_named() {
+    fn all_ignored_messages_are_counted_and_first_4_senders_named() {
         let mut strangers = IgnoredSenders::default();
         assert_eq!(strangers.words(), None);
         for number in 0..1000 {

@@ -1,4 +1,4 @@
-//! Handling of cable counter readings: whether to fuse them, and the effects of a dispute.
+//! Handling of cable counter readings: the decision whether to fuse them, and the effects of a dispute.
 
 use headrace_geometry::math;
 use headrace_sensor::device::SensorKind;
@@ -15,8 +15,10 @@ use crate::filter::state::{CREEP, Errors, POSITION, RATE_BIAS, VELOCITY, add_to}
 use crate::filter::window::Waiting;
 
 impl Eskf {
-    /// Judges a counter reading by its innovation, m, and its variance, m^2; returns whether to fuse it. `None` for
-    /// other sensors.
+    /// Judges a counter reading by its innovation, m, and the innovation's variance, m^2; returns whether to fuse
+    /// it.
+    ///
+    /// `None` for readings of other sensors.
     pub(super) fn believes_counter(
         &mut self,
         waiting: &Waiting,
@@ -46,7 +48,7 @@ impl Eskf {
         Some(self.trusts(&CableReading { at, shown_m, off_m, sd_m, agrees, is_usual, is_lively }, errors))
     }
 
-    /// Corrects by a counter reading, and notes its effect on the estimate.
+    /// Corrects by a counter reading, and records how much the estimate changes.
     pub(super) fn correct_by_counter(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
         let along = |eskf: &Self, errors: &Errors| {
             [POSITION, VELOCITY].map(|i| [errors.get(i).copied().unwrap_or(0.0), eskf.factors.variance(i)])
@@ -58,7 +60,8 @@ impl Eskf {
         self.cable.corrections.note(by, [before_p[1] - after_p[1], before_v[1] - after_v[1]]);
     }
 
-    /// Judges a cable reading; returns whether to fuse it. Its loss becomes creep.
+    /// Judges a cable reading; returns whether to fuse it. A length that the counter has lost is added to the
+    /// creep.
     fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
         let used = self.cable.take(reading);
         self.slipped_m2 += self.cable.corrections.take_slipped_m2();
@@ -74,11 +77,11 @@ impl Eskf {
             }
             Use::Slipped(lost_m) => {
                 self.slack_level.skip();
-                // The vehicle keeps its position, so that later soundings fit those placed during the doubt.
+                // The estimated position does not change, so that later soundings fit those placed during the
+                // dispute.
                 add_to(errors, CREEP, lost_m);
                 add_to(&mut self.doubts, CREEP, lost_m * lost_m);
-                // Either source may have been wrong: the loss of the counter, and the motion of the vehicle
-                // meanwhile.
+                // Either the counter has lost this length, or the estimated motion was wrong meanwhile.
                 self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
                 self.ties += 1;
             }

@@ -1,4 +1,4 @@
-//! Sensor faults: frozen, saturated, jumping, silent, disturbed, or not finite.
+//! Sensor faults: frozen, saturated, jumping, silent and disturbed sensors, and readings that are not finite.
 
 use super::rig::{
     DEPTH, ECHOES, Event, HEADS, IMU, OTHER, Rig, TETHER, VELOCITY_LOG, Way, at, cruise, rest, seconds,
@@ -15,7 +15,7 @@ const RANGES: [usize; 6] = [3, 4, 5, 6, 7, 8];
 /// Time at which faults begin.
 const FAULT_S: f64 = 20.0;
 
-/// Replaces readings of some sources for a while after the faults begin.
+/// Replaces the readings of some sources for `for_s` from the beginning of the faults.
 fn say_otherwise(
     events: &mut [Event],
     sources: &[usize],
@@ -30,7 +30,7 @@ fn say_otherwise(
     }
 }
 
-/// Makes a source repeat its last reading.
+/// Makes a source repeat its last reading before the fault.
 fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     let before = events.to_vec();
     let last = |like: &Reading| {
@@ -41,7 +41,7 @@ fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     say_otherwise(events, &[source], for_s, |reading, _| last(reading));
 }
 
-/// Runs the filter unchecked during the fault, which looks like real motion, and checks it afterwards.
+/// Checks the filter before the fault and from `wrong_until_s` on. In between, the fault looks like real motion.
 fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
     let mut nav = rig.navigation();
     let parts = [0.0, FAULT_S, wrong_until_s, f64::INFINITY];
@@ -63,7 +63,7 @@ fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
 
 #[test]
 fn fix_is_withheld_after_long_silence_and_returns() {
-    /// Name, trajectory, silent sources, duration, and whether the fix is missing at the end.
+    /// Name, trajectory, silent sources, duration, and whether there is no fix at the end.
     type Silence = (&'static str, Way, &'static [usize], f64, bool);
     let near_wall: Way = |t| Pose {
         position: Point3::new(3.0 + 0.1 * t, 5.2, 3.0),
@@ -100,7 +100,7 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
     let rig = Rig::new(rest, 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, FAULT_S));
-    // The first period still contains the last readings of the window.
+    // Until a second after the fault begins, the window still contains readings.
     let last = at(FAULT_S + 1.0);
     Rig::hear(&mut nav, &Event { received: last, valid: last, source: OTHER, reading: rig.rate(0.0) });
     let mut before = nav.running().unwrap().factors;
@@ -109,7 +109,7 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
         let beat = Event { received: t, valid: t, source: OTHER, reading: rig.rate(0.0) };
         Rig::hear(&mut nav, &beat);
         let running = nav.running().unwrap();
-        // The creep of the cable does not grow, but position, velocity and attitude do.
+        // The errors of position, velocity and attitude grow. The creep of the cable does not grow.
         for i in (0..10).filter(|i| *i != CREEP) {
             let (now, then) = (running.factors.variance(i), before.variance(i));
             assert!(now > then, "error {i} in period {k}: {now}, {then} before");
@@ -117,7 +117,7 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
         before = running.factors;
     }
     assert!(matches!(nav.fix(at(FAULT_S + 15.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
-    // The estimate does not drift away either.
+    // The estimated position does not drift away meanwhile.
     assert!((nav.running().unwrap().state.position - rig.unit(0.0)).norm() < 1.0);
 }
 
@@ -151,7 +151,7 @@ fn spoilt(reading: &Reading, bad: f64) -> Reading {
 }
 
 #[test]
-fn saturated_unit_is_rejected() {
+fn saturated_inertial_samples_are_rejected() {
     let rig = Rig::new(cruise, 1);
     for (magnitude, for_s) in [(156.9, 0.02), (156.9, 1.0), (1e300, 0.02), (f64::MAX, 5.0)] {
         for is_rate in [true, false] {
@@ -166,7 +166,8 @@ fn saturated_unit_is_rejected() {
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &events);
             assert!(nav.consistency(IMU).unwrap().dropped > 0);
-            // The speed change of a rejected force is unknown. While that uncertainty is too large, there is no fix.
+            // The speed change by a rejected force is unknown. While this makes the speed too uncertain, there is
+            // no fix.
             let lacking = if is_rate { 0 } else { math::round_to_i64(10.0 * for_s) + 5 };
             assert!(i64::from(tally.lacking) <= lacking, "{magnitude} for {for_s} s: {tally:?}");
         }
@@ -174,7 +175,7 @@ fn saturated_unit_is_rejected() {
 }
 
 #[test]
-fn disturbed_compass_is_survived() {
+fn fix_stays_right_with_a_disturbed_compass() {
     for off_deg in [5.0_f64, 10.0, 20.0, 60.0, 180.0] {
         for sudden in [true, false] {
             let rig = Rig::new(cruise, 1);
@@ -229,8 +230,8 @@ fn jumping_sensor_is_rejected() {
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
-        // While counter and estimate differ by metres, the chainage is unknown: during the jump, and a second until
-        // the counter runs correctly.
+        // The chainage is unknown while counter and estimate differ by metres. This lasts until a second after the
+        // jump.
         let lacking = if source == TETHER { 45 } else { 0 };
         assert!(
             tally.lacking <= lacking && consistency.gated >= 6,
@@ -275,8 +276,9 @@ fn ranged(reading: &Reading, share: f64) -> Reading {
 }
 
 #[test]
-fn plausible_jump_is_survived() {
-    // A knock or a faulty unit: no single sensor shows it, and the fix is wrong until the others have corrected it.
+fn filter_recovers_from_a_plausible_jump_within_60_s() {
+    // A knock or a faulty unit: no single sensor shows the fault. The fix is wrong until the other sensors have
+    // corrected it.
     let forces = [(5.0, 0.2), (5.0, 1.0), (1.0, 5.0), (0.2, 20.0)].map(|jump| (jump, false));
     let rates = [(5.0, 0.02), (5.0, 0.2), (1.0, 1.0), (0.1, 5.0), (0.01, 20.0)].map(|jump| (jump, true));
     let jumps = forces.into_iter().chain(rates).flat_map(|jump| (1..=6).map(move |seed| (jump, seed)));
@@ -295,9 +297,9 @@ fn plausible_jump_is_survived() {
 }
 
 #[test]
-fn frozen_sensor_is_survived() {
-    // The depth sensor and one head are outvoted at once. An echosounder pulls the position by centimetres before its
-    // range becomes too improbable.
+fn filter_recovers_from_a_frozen_sensor() {
+    // The other sensors outvote the depth sensor and one head at once. An echosounder moves the position by
+    // centimetres before its range becomes too improbable.
     let frozen = [(DEPTH, 0.0), (HEADS, 0.0), (ECHOES, 35.0), (ECHOES + 2, 35.0), (IMU, 60.0)];
     for (source, wrong_s) in frozen {
         for seed in 1..=6 {
@@ -309,11 +311,11 @@ fn frozen_sensor_is_survived() {
     }
 }
 
-/// The head reports the echo of its own frame, or its last echo, while it keeps turning.
+/// A head reports the echo of its own frame, or its last echo, while it keeps turning.
 ///
-/// In each turn it agrees with the wall for a while.
+/// In each turn, this range agrees with the wall for a while.
 #[test]
-fn head_with_one_range_does_not_turn_the_estimate() {
+fn head_with_constant_range_does_not_turn_the_estimate() {
     let (for_s, mut gated) = (40.0, 0);
     for seed in 1..=5 {
         let rig = Rig::new(cruise, seed);
@@ -332,7 +334,7 @@ fn head_with_one_range_does_not_turn_the_estimate() {
     assert!(gated > 500, "{gated}");
 }
 
-/// The estimate stays right by its own standard deviations, and the counter is doubted within two seconds.
+/// Errors stay within the limit in standard deviations, and the counter is doubted within two seconds.
 #[test]
 fn stuck_or_slipping_counter_is_doubted_and_not_followed() {
     for seed in 1..4 {
@@ -360,9 +362,12 @@ fn stuck_or_slipping_counter_is_doubted_and_not_followed() {
                 let split = events.partition_point(|event| seconds(event.received) < FAULT_S + 1.9);
                 let (first, rest) = events.split_at(split);
                 rig.run(&mut nav, first);
-                assert!(nav.cable_doubted_since().is_some(), "after 1.9 of {for_s} s");
+                assert!(nav.cable_doubted_since().is_some(), "no doubt after 1.9 s of {for_s} s");
                 rig.run(&mut nav, rest);
-                assert!(nav.cable_doubted_since().is_none(), "long after {for_s} s, back: {comes_back}");
+                assert!(
+                    nav.cable_doubted_since().is_none(),
+                    "doubt long after {for_s} s, back: {comes_back}"
+                );
                 assert!(nav.fix(events.last().unwrap().received).is_ok());
             }
         }
@@ -374,10 +379,9 @@ fn length_m(reading: &Reading) -> f64 {
     length.length_m
 }
 
-/// A counter sticks for good while the vehicle moves on. Eventually the position is unknown, and the filter reports
-/// that.
+/// A counter sticks permanently while the vehicle moves on. Eventually the filter reports an unknown chainage.
 ///
-/// Motion steady enough to feel like rest to gyros and accelerometers does not count as rest.
+/// To gyros and accelerometers, steady motion looks like rest. But the filter does not take it for rest.
 #[test]
 fn permanently_stuck_counter_leads_to_no_fix() {
     let steady: Way = |t| Pose { position: Point3::new(3.0 + 0.2 * t, 0.4, 4.0), attitude: Rot::identity() };
@@ -391,9 +395,9 @@ fn permanently_stuck_counter_leads_to_no_fix() {
     }
 }
 
-/// The vehicle reverses within one sample: the unit's force is implausible, but real.
+/// The vehicle reverses within one sample of the inertial unit. The measured force is implausible, but real.
 #[test]
-fn jolt_is_uncertain_until_the_cable_corrects_it() {
+fn fix_returns_after_a_jolt_beyond_the_plausible_force() {
     let jolted: Way = |t| Pose {
         position: Point3::new(if t < FAULT_S { 3.0 + 0.5 * t } else { 13.0 - 0.5 * (t - FAULT_S) }, 0.4, 4.0),
         attitude: Rot::identity(),

@@ -1,5 +1,7 @@
-//! Extremes of time, order, attitude and scale. Each ends with a fix that is right by its own sd, or with the named
-//! missing part.
+//! Extremes of time, order, attitude and scale.
+//!
+//! Each ends with a fix whose error is within the limit in standard deviations, or with the name of the missing
+//! part.
 
 use super::super::factors::Factors;
 use super::super::inertial::{InertialSample, Leg};
@@ -17,7 +19,7 @@ use headrace_support::hard_cases::{found, found_at};
 
 const HOUR: DurNs = DurNs(3_600_000_000_000);
 
-/// Estimate and covariance a second after the last reading was valid, when the window is empty.
+/// Returns estimate and covariance a second after the last time of validity, when the window is empty.
 fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
     let mut nav = rig.navigation();
     let last = events.iter().map(|event| event.valid).max().unwrap();
@@ -31,7 +33,7 @@ fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
 }
 
 #[test]
-fn ordinary_minute_is_right_and_consistent() {
+fn ordinary_minute_has_consistent_innovations() {
     for seed in 1..5 {
         let rig = Rig::new(cruise, seed);
         let mut nav = rig.navigation();
@@ -54,7 +56,7 @@ fn ordinary_minute_is_right_and_consistent() {
 }
 
 #[test]
-fn precise_fix_after_10_h_of_dead_reckoning_is_absorbed() {
+fn position_is_regained_after_10_h_of_dead_reckoning() {
     let rig = Rig { imu_s: 0.1, ..Rig::new(cruise, 1) };
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, 20.0));
@@ -68,7 +70,10 @@ fn precise_fix_after_10_h_of_dead_reckoning_is_absorbed() {
         }
         rig.check(&nav, events.last().unwrap().received, &mut tally);
     }
-    assert!(nav.running().is_none() && nav.fix(at(f64::from(end_s))).is_err(), "a fix without measurements");
+    assert!(
+        nav.running().is_none() && nav.fix(at(f64::from(end_s))).is_err(),
+        "there must be no fix without measurements"
+    );
     assert_eq!(nav.consistency(IMU).unwrap().dropped, 0, "unused samples must not fill the window");
     rig.run(&mut nav, &rig.events(f64::from(end_s), f64::from(end_s + 60)));
     let fix = nav.fix(at(f64::from(end_s + 60)));
@@ -78,7 +83,7 @@ fn precise_fix_after_10_h_of_dead_reckoning_is_absorbed() {
 }
 
 #[test]
-fn noise_of_any_scale_keeps_the_covariance_sound() {
+fn covariance_stays_valid_with_noise_of_any_scale() {
     let (exact, vague) = (1e-5, 1e5);
     for (tether_sd_m, echo_sd_m, return_sd_m, depth_sd_m) in
         [(exact, exact, vague, vague), (vague, vague, exact, exact), (exact, vague, exact, vague)]
@@ -92,7 +97,7 @@ fn noise_of_any_scale_keeps_the_covariance_sound() {
 }
 
 #[test]
-fn leg_of_any_length_adds_the_expected_variance() {
+fn leg_of_any_length_keeps_the_covariance_valid() {
     let settings = Settings::default();
     let felt = InertialSample {
         rate_radps: Some(Vec3::new(0.1, 0.2, -0.1)),
@@ -111,7 +116,7 @@ fn leg_of_any_length_adds_the_expected_variance() {
             }
             assert!(state.is_sound() && factors.is_sound(), "{dt_s} s: {state:?}");
             for i in 0..ERRORS {
-                // Errors of the pose never shrink over time; errors that decay do.
+                // Errors of the pose never shrink over time. Only errors that decay shrink.
                 let least = if i < 9 { 1e-4 * (1.0 - 1e-12) } else { 0.0 };
                 assert!(factors.variance(i) > least, "{dt_s} s, error {i}: {}", factors.variance(i));
             }
@@ -124,11 +129,11 @@ fn leg_of_any_length_adds_the_expected_variance() {
 }
 
 #[test]
-fn repeated_sample_counts_once() {
+fn repeated_inertial_sample_counts_once() {
     let rig = Rig::new(cruise, 1);
     let events = rig.events(0.0, 20.0);
     let right = outcome(&rig, &events);
-    // The second copy comes at the same time, a nanosecond later, or with an earlier timestamp.
+    // The second copy has the same times, times a nanosecond later, or a later receive time.
     for (later, delay) in [(0, 0), (1, 1), (0, 90_000_000)] {
         let mut again = events.clone();
         let inertial = events.iter().filter(|event| !matches!(event.reading, Reading::Attitude(_)));
@@ -138,7 +143,7 @@ fn repeated_sample_counts_once() {
             ..*event
         }));
         again.sort_by_key(|event| event.received);
-        assert_eq!(outcome(&rig, &again), right, "{later} ns later, {delay} ns on the way");
+        assert_eq!(outcome(&rig, &again), right, "copies {later} ns later, delayed by {delay} ns");
     }
 }
 
@@ -171,7 +176,7 @@ fn readings_give_the_same_result_in_any_arrival_order() {
     let rig = Rig::new(cruise, 2);
     let events = rig.events(0.0, 30.0);
     let right = outcome(&rig, &events);
-    // Each source has its own delay within the window, so that readings overtake each other.
+    // Each source has its own delay within the window, so that readings arrive in a different order.
     for shift in 1..4 {
         let mut mixed = events.clone();
         for event in mixed.iter_mut().filter(|event| seconds(event.valid) > 2.0) {
@@ -181,7 +186,7 @@ fn readings_give_the_same_result_in_any_arrival_order() {
         mixed.sort_by_key(|event| event.received);
         assert_eq!(outcome(&rig, &mixed), right, "shift {shift}");
     }
-    // Readings of an unused source in between, however many, have no effect.
+    // Additional readings of an unused source have no effect, however many they are.
     let mut beaten = events.clone();
     beaten.extend((1..9000).map(|k| {
         let t = at(f64::from(k) / 300.0);
@@ -212,7 +217,7 @@ fn late_readings_are_counted_and_ignored() {
 }
 
 #[test]
-fn filter_works_at_any_attitude() {
+fn errors_stay_within_limits_at_any_attitude() {
     let ways: [(&str, Way); 6] = [
         ("nose up, over and back", |t| tilting(t, -1.8)),
         ("nose down, over and back", |t| tilting(t, 1.8)),
@@ -226,7 +231,7 @@ fn filter_works_at_any_attitude() {
             let rig = Rig::new(way, seed);
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &rig.events(0.0, 70.0));
-            // The first estimate has no height if no echosounder looks up or down.
+            // The first estimate has no height if no echosounder faces up or down.
             assert!(tally.lacking <= 2, "{name}: {tally:?}");
         }
     }
@@ -266,7 +271,7 @@ fn quaternion_sign_and_length_have_no_effect() {
 }
 
 #[test]
-fn past_fix_has_the_past_attitude() {
+fn fix_at_a_past_time_has_the_attitude_of_that_time() {
     let rig = Rig::new(|t| still(t, 0.01, 0.5 * t), 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, 30.0));
@@ -278,7 +283,7 @@ fn past_fix_has_the_past_attitude() {
 }
 
 #[test]
-fn past_fix_has_the_past_position() {
+fn fix_at_a_past_time_has_the_position_of_that_time() {
     let rig = Rig::new(cruise, 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, 30.0));
@@ -290,9 +295,10 @@ fn past_fix_has_the_past_position() {
 }
 
 #[test]
-fn any_receive_time_is_survived() {
+fn fix_survives_stopped_and_jumping_clocks() {
     let rig = Rig::new(rest, 2);
-    // The clock stops for a second at a time, then goes back by as much each time.
+    // The clock stands still for a second at a time, or in the second case runs backwards for a tenth of a second
+    // at a time.
     for (stamp, back) in [(1_000_000_000_u64, false), (100_000_000, true)] {
         let mut events = rig.events(0.0, 40.0);
         for event in &mut events {
@@ -304,7 +310,7 @@ fn any_receive_time_is_survived() {
         let tally = rig.run(&mut nav, &events);
         assert!(tally.fixes > 30, "{tally:?}");
     }
-    // The clock skips an hour.
+    // The clock jumps ahead by an hour.
     let mut events = rig.events(0.0, 90.0);
     for event in events.iter_mut().filter(|event| seconds(event.valid) > 30.0) {
         (event.valid, event.received) = (event.valid + HOUR, event.received + HOUR);
@@ -313,7 +319,7 @@ fn any_receive_time_is_survived() {
     let tally = rig.run(&mut nav, &events);
     assert_eq!(nav.restarts(), 1, "{tally:?}");
     assert!(nav.fix(at(90.0) + HOUR).is_ok(), "{:?}", nav.fix(at(90.0) + HOUR));
-    // One reading is stamped an hour ahead, and so is one whose time of validity is then. The rest is unchanged.
+    // One reading has a receive time an hour ahead, and another has a time of validity an hour ahead.
     let mut events = rig.events(0.0, 60.0);
     let middle = events.len() / 2;
     events[middle].received = events[middle].received + HOUR;
@@ -323,21 +329,22 @@ fn any_receive_time_is_survived() {
     for event in &events {
         Rig::hear(&mut nav, event);
     }
-    // One restart for the apparent silence of an hour's jump, and one when the clock returns.
+    // The jump by an hour looks like a silence and causes a restart. The return of the clock causes a second
+    // restart.
     assert_eq!(nav.restarts(), 2);
     assert_eq!(nav.consistency(source).unwrap().dropped, 1);
     assert!(nav.fix(at(60.0)).is_ok());
 }
 
-/// The cruise, starting `KM` kilometres into the tunnel.
+/// Same motion as `cruise`, but it begins `KM` kilometres farther into the tunnel.
 fn cruise_at<const KM: u32>(t: f64) -> Pose {
     let Pose { position: at, attitude } = cruise(t);
     Pose { position: Point3::new(at.x() + 1e3 * f64::from(KM), at.y(), at.z()), attitude }
 }
 
-/// The relative error between passes is the same at any chainage.
+/// The relative error between passes is equally certain at any chainage.
 ///
-/// The cable's scale makes the chainage itself less certain with distance, by 2 km at 1,000 km.
+/// The chainage itself becomes less certain with distance because of the cable's scale, by 2 km at 1,000 km.
 #[test]
 fn passes_are_equally_certain_at_any_chainage() {
     let ways: [(f64, Way); 3] = [(3e3, cruise_at::<3>), (7e3, cruise_at::<7>), (1e6, cruise_at::<1000>)];
@@ -367,7 +374,7 @@ fn passes_are_equally_certain_at_any_chainage() {
     found_at("filter.far_sd", condition, sd_off, 1e-4);
 }
 
-/// Motion to and fro over the same 12 m, one minute per round.
+/// Motion to and fro over the same 12 m, with one round a minute.
 fn rounds(t: f64) -> Pose {
     let phase = math::TAU * t / 60.0;
     Pose {
@@ -384,8 +391,8 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// The advice to stand still ends once the bias is known, no later than first stated, and is not repeated after the
-/// vehicle moves on.
+/// The advice to stand still ends once the bias is known, within the time stated at first. The advice does not
+/// return.
 #[test]
 fn stand_still_advice_ends_once_the_bias_is_known() {
     let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };
@@ -406,7 +413,7 @@ fn stand_still_advice_ends_once_the_bias_is_known() {
     assert!(asked[begun + 31..].iter().all(|asked_s| *asked_s == 0), "{asked:?}");
 }
 
-/// Largest relative change of the sd between passes from the tenth minute on, at the same point of the round.
+/// Returns the largest relative increase of the sd between passes after the tenth minute, once per round.
 fn change_over_hours(hours: u32) -> f64 {
     let rig = Rig { imu_s: 0.1, ..Rig::new(rounds, 1) };
     let mut nav = rig.navigation();
@@ -427,13 +434,13 @@ fn change_over_hours(hours: u32) -> f64 {
 }
 
 #[test]
-fn pass_sd_is_constant_over_an_hour() {
+fn pass_sd_does_not_grow_over_an_hour() {
     found("filter.hour", change_over_hours(1), 0.01);
 }
 
 #[test]
 #[ignore = "takes a minute"]
-fn pass_sd_is_constant_over_10_h() {
+fn pass_sd_does_not_grow_over_10_h() {
     let change = change_over_hours(10);
     assert!(change < 0.01, "{change}");
 }

@@ -1,9 +1,8 @@
-//! Verification that the rows of measurements and the transition are the derivatives of their models.
+//! Verification that measurement rows and transition are the derivatives of their models.
 //!
 //! The reference is central differences of the nonlinear functions, through `State::correct` and `State::go_on`.
-//!
-//! States are drawn at random: attitudes all over the sphere, sensors anywhere on the vehicle, biases and offsets of
-//! either sign.
+//! States are drawn at random. Attitudes cover the whole sphere, sensors are anywhere on the vehicle, and biases
+//! and offsets have either sign.
 
 use crate::filter::inertial::{InertialSample, Leg, Transition};
 use crate::filter::measure::{self, Beam, ScalarUpdate};
@@ -18,17 +17,16 @@ use headrace_geometry::tunnel::{Profile, shapes};
 
 const STATES: u64 = 300;
 const GRAVITY_MPS2: f64 = 9.81;
-/// Step of the differences.
+/// Step of the central differences.
 ///
-/// The truncation error is of the order of its square (1e-8 for numbers near one). Rounding is of the order of 1e-16
-/// / 1e-4 times the numbers, which reach some hundreds of metres: 1e-10.
+/// The truncation error is about the square of the step: 1e-8 for numbers near one. The rounding error is about
+/// 1e-16 / 1e-4 times the numbers. They reach some hundreds of metres, so it is 1e-10.
 const STEP: f64 = 1e-4;
-/// Covers both errors with a margin.
-///
-/// A wrong sign or missing term causes an error of at least a hundredth.
+/// Tolerance that covers both errors with a margin. A wrong sign or a missing term causes an error of at least
+/// 0.01.
 const TOLERANCE: f64 = 1e-6;
 
-/// Knuth's MMIX generator; returns the upper half of its state as a share of one.
+/// Knuth's MMIX generator. The upper half of its state gives a number from 0 to 1.
 pub(super) struct Draws(u64);
 
 impl Draws {
@@ -45,7 +43,7 @@ impl Draws {
         (self.0 >> 32) as f64 / 4_294_967_296.0
     }
 
-    /// Uniform in [-reach, reach).
+    /// Returns a uniform number in [-reach, reach).
     pub(super) fn within(&mut self, reach: f64) -> f64 {
         reach * (2.0 * self.share() - 1.0)
     }
@@ -54,12 +52,12 @@ impl Draws {
         Vec3::new(self.within(reach), self.within(reach), self.within(reach))
     }
 
-    /// Approximately normal with variance 1.
+    /// Returns an approximately normal number with variance 1.
     pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.within(0.5)).sum()
     }
 
-    /// All attitudes: upright ones, and some near a pitch of 90 degrees.
+    /// Returns a random attitude: nearly upright, arbitrary, or near a pitch of 90 degrees.
     fn attitude<From>(&mut self) -> Rot<Tunnel, From> {
         let pitch = match self.0 >> 62 {
             0 => PI / 2.0 + self.within(1e-3),
@@ -100,9 +98,9 @@ fn moved(state: &State, error: usize, by: f64) -> State {
     state
 }
 
-/// Checks a row against the differences of its residual.
+/// Checks a row against central differences of its residual.
 ///
-/// The expected value is the measured one minus the residual.
+/// The expected value is the measured value less the residual.
 fn check_row(
     what: &str,
     state: &State,
@@ -117,19 +115,19 @@ fn check_row(
         };
         let slope = (below.residual - above.residual) / (2.0 * STEP);
         let off = (slope - at.h[error]).abs();
-        assert!(off < tolerance, "{what}, error {error}: {slope}, the row says {}: {state:?}", at.h[error]);
+        assert!(off < tolerance, "{what}, error {error}: {slope}, the row has {}: {state:?}", at.h[error]);
     }
     true
 }
 
-/// Beams on a rectangle, whose walls are the planes that the row assumes.
+/// The walls of a rectangle are planes, as the row assumes.
 ///
-/// A beam whose differences cross a corner is skipped, because its wall is not a plane.
+/// A beam is skipped if its differences cross a corner, because the wall is no plane there.
 #[test]
-fn beam_row_on_flat_walls() {
+fn beam_row_on_flat_walls_equals_differences() {
     let profile = shapes::rectangle(7.0, 8.0).unwrap();
     let mut draws = Draws::new(1);
-    // The edge of an echosounder's beam, a head's cone, and a cone so wide that the nearest part of the wall echoes.
+    // An echosounder's beam, a head's cone, and a cone so wide that the nearest part of the wall echoes.
     for first_rad in [0.0, 0.012, 0.4] {
         let checked =
             (0..STATES).filter(|_| check_beam(&mut draws, &profile, first_rad, |_| TOLERANCE)).count();
@@ -137,17 +135,17 @@ fn beam_row_on_flat_walls() {
     }
 }
 
-/// The expected range of a cone is the shortest of its rays, and the uncertainty reaches to the shortest ray of the
-/// wider cone.
+/// The expected range of a cone equals its shortest ray. The uncertainty extends to the shortest ray of the wider
+/// cone.
 #[test]
-fn cone_range_is_its_shortest_ray() {
-    // Rays on rings around the axis. The minimum over the grid is too long by at most the square of half a mesh, 5e-3
+fn cone_range_equals_that_of_its_shortest_ray() {
+    // The rays lie on rings around the axis. Their minimum is too long by at most the square of half a mesh, 5e-3
     // rad.
     const RINGS: u32 = 200;
     let profile = shapes::rectangle(60.0, 60.0).unwrap();
     let mut draws = Draws::new(11);
     for _ in 0..40 {
-        // The beam leans sideways and along the tunnel over a floor that is too wide for the cone to meet a wall.
+        // The beam leans sideways and along the tunnel. The floor is so wide that the cone meets no wall.
         let lean = rotation(Vec3::new(draws.within(0.6), draws.within(0.6), 0.0)) * Rot::identity();
         let position = Point3::new(0.0, 0.0, 3.0);
         let state = State { position, attitude: lean, range_scale: 0.0, ..draws.state() };
@@ -169,18 +167,18 @@ fn cone_range_is_its_shortest_ray() {
             assert!((-row.residual - expected_m).abs() < 1e-3, "{row:?}, not {expected_m}");
             let unsure_m = (expected_m - least_m(unsure_rad.max(first_rad))) / math::sqrt(3.0);
             let says_m = math::sqrt((row.noise - 0.01).max(0.0));
-            assert!((says_m - unsure_m).abs() < 1e-3, "unsure by {says_m}, not {unsure_m}");
+            assert!((says_m - unsure_m).abs() < 1e-3, "uncertainty {says_m}, not {unsure_m}");
         }
     }
 }
 
-/// Beams on a round wall: without a cone, the row is exact on any wall.
+/// Without a cone, the row of a beam on a round wall is exact. With a cone, its error is bounded as follows.
 ///
-/// With a cone, the tangent plane at the axis turns as that point moves, by 1 / radius per metre. The row neglects
-/// range x sin(first) / cos^2 of that. The point moves by at most 1 m / cosine per metre, or `range` / cosine per
-/// radian. These terms bound the error.
+/// The row assumes the tangent plane where the beam's axis meets the wall. This point moves by at most 1 m / cosine
+/// per metre, or by `range` / cosine per radian. The tangent plane then turns by 1 / radius per metre. The row
+/// neglects the effect of this turn on the range, which is range x sin(first) / cos^2 per radian.
 #[test]
-fn beam_row_on_round_walls() {
+fn beam_row_on_round_walls_equals_differences() {
     const RADIUS_M: f64 = 4.0;
     let profile = shapes::circle(RADIUS_M).unwrap();
     let mut draws = Draws::new(2);
@@ -197,12 +195,12 @@ fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: i
     let state = draws.state();
     let along = draws.mounted() * Vec3::new(1.0, 0.0, 0.0);
     let beam = Beam { offset: draws.vector(0.5), along, first_rad, unsure_rad: 0.0 };
-    // Expected value of the row, from a measured range of zero.
+    // A measured range of zero makes the residual minus the expected range.
     let Some(row) = measure::range(&state, profile, &beam, 0.0, 0.1) else { return false };
     let origin = state.position + state.attitude * beam.offset;
     let looks = state.attitude * along;
     let hit = profile.cast([origin.y(), origin.z()], [looks.y(), looks.z()]).unwrap();
-    // The slope has a kink where the cone just ceases to contain the normal.
+    // The slope has a kink where the wall's normal leaves the cone. States near the kink are skipped.
     let incidence = math::acos(-(hit.normal[0] * looks.y() + hit.normal[1] * looks.z()));
     let edge = [origin.y() + looks.y() * hit.range_m, origin.z() + looks.z() * hit.range_m];
     let corner = (edge[0].abs() - 3.5).abs() < CORNER_M
@@ -216,7 +214,7 @@ fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: i
 }
 
 #[test]
-fn height_and_chainage_rows() {
+fn height_and_chainage_rows_equal_differences() {
     let mut draws = Draws::new(3);
     for _ in 0..STATES {
         let (state, offset) = (draws.state(), draws.vector(0.8));
@@ -232,10 +230,10 @@ fn height_and_chainage_rows() {
 
 /// The rows of an attitude are exact if measured and estimated attitude agree, as in a converged filter.
 ///
-/// At a difference of an angle they are wrong by half of it. So the measured attitude is within 1e-7 of the estimate,
-/// deviation included.
+/// If they differ by an angle, the rows are wrong by half of it. So the measured attitude, deviation included, is
+/// within 1e-7 of the estimate.
 #[test]
-fn attitude_rows() {
+fn attitude_rows_equal_differences() {
     let mut draws = Draws::new(4);
     for _ in 0..STATES {
         let state = State { heading_offset_rad: 0.0, ..draws.state() };
@@ -248,11 +246,10 @@ fn attitude_rows() {
     }
 }
 
-/// A compass deviation rotates the measured attitude about the tunnel's z axis.
-///
-/// The residual is then zero.
+/// A measured attitude that is turned by exactly the compass deviation about the tunnel's z axis has a residual of
+/// zero.
 #[test]
-fn compass_deviation_gives_no_residual() {
+fn attitude_with_known_compass_deviation_has_no_residual() {
     let mut draws = Draws::new(5);
     for _ in 0..STATES {
         let state = draws.state();
@@ -263,11 +260,11 @@ fn compass_deviation_gives_no_residual() {
     }
 }
 
-/// The turn rate is an input, so that the gyro bias is not an error of the row.
+/// The turn rate is an input of the row, so the row does not depend on the gyro bias.
 ///
-/// See "What is left out" in `docs/why/navigation.md`.
+/// See "Not modelled" in `docs/why/navigation.md`.
 #[test]
-fn velocity_and_rest_rows() {
+fn velocity_and_rest_rows_equal_differences() {
     let mut draws = Draws::new(6);
     for _ in 0..STATES {
         let state = draws.state();
@@ -282,9 +279,9 @@ fn velocity_and_rest_rows() {
     }
 }
 
-/// Velocity of a point on a turning body, by differences of the point's position.
+/// The reference is central differences of the position of a point on a turning body.
 #[test]
-fn velocity_of_a_sensor_on_a_lever_arm() {
+fn velocity_on_a_lever_arm_equals_differences_of_position() {
     let mut draws = Draws::new(7);
     for _ in 0..STATES {
         let state = draws.state();
@@ -302,11 +299,11 @@ fn velocity_of_a_sensor_on_a_lever_arm() {
     }
 }
 
-/// A tenth of a second earlier, the position is the present one less the displacement.
+/// The reference predicts a measurement made 0.07 s before the estimate, at the position at that time.
 ///
 /// This is exact for constant velocity.
 #[test]
-fn row_seen_later() {
+fn row_of_an_earlier_measurement_equals_differences() {
     const LATER_S: f64 = 0.07;
     let mut draws = Draws::new(8);
     for _ in 0..STATES {
@@ -319,7 +316,7 @@ fn row_seen_later() {
     }
 }
 
-/// An epoch of ten samples; `None` for missing data.
+/// Propagates a state by samples of 10 ms; returns the final state and the transition of errors.
 fn go_on(start: &State, felt: &[InertialSample]) -> (State, Transition) {
     let (mut state, mut leg) = (*start, Leg::default());
     for felt in felt {
@@ -330,12 +327,12 @@ fn go_on(start: &State, felt: &[InertialSample]) -> (State, Transition) {
     (state, transition)
 }
 
-/// The transition uses the rotation in the middle of a sample for all of it.
+/// The transition uses the rotation in the middle of a sample for the whole sample.
 ///
-/// Its error is up to a quarter of the angle turned in a sample, 0.01 rad, in the bias terms only. The largest of
-/// these is 0.1 s of turning, or 0.05 s^2 of force: 0.1 x 0.0025. A wrong factor or missing term is larger for each
-/// block except the displacement by a gyro bias through tilting, 10 m/s^2 x 0.1^3 / 6. So each block is compared with
-/// its own size.
+/// Only the bias terms are wrong by this, by up to a quarter of the angle turned in a sample (0.01 rad). The
+/// largest bias terms are 0.1 s of turning and 0.05 s^2 of force, so the error is up to 0.1 x 0.0025. In most
+/// blocks, a wrong factor or a missing term causes a larger error. The exception is the displacement by a gyro bias
+/// through tilting, 10 m/s^2 x 0.1^3 / 6. So each block is compared with its own size.
 #[test]
 fn transition_equals_differences_of_the_model() {
     let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];
@@ -345,7 +342,7 @@ fn transition_equals_differences_of_the_model() {
     for round in 0..STATES {
         let start = draws.state();
         let (rate, force) = (draws.vector(0.6), draws.vector(3.0) + Vec3::new(0.0, 0.0, 9.0));
-        // Some rounds miss gyro or accelerometer data, for part or all of the epoch.
+        // In some rounds, gyro or accelerometer data are missing for part or all of the epoch.
         let blind = |k: u64, part: u64| round % 4 == part && k >= round % 3 * 4;
         let felt: Vec<_> = (0..10)
             .map(|k| InertialSample {
@@ -383,9 +380,9 @@ fn transition_equals_differences_of_the_model() {
     }
 }
 
-/// Factors propagated by the transition equal those of F P F^T.
+/// Factors propagated by the transition are the factors of F P F^T.
 #[test]
-fn transition_propagates_factors() {
+fn transition_of_factors_equals_f_p_ft() {
     use crate::filter::factors::Factors;
     let mut draws = Draws::new(10);
     for _ in 0..20 {
@@ -401,7 +398,7 @@ fn transition_propagates_factors() {
         }
         let before: [Errors; ERRORS] = factors.rows(core::array::from_fn(|i| i));
         transition.carry(&mut factors);
-        // F P, then F (F P)^T, by columns.
+        // F P first, and then F (F P)^T, both by columns.
         let carried = |mut columns: [Errors; ERRORS]| {
             for column in &mut columns {
                 transition.apply(column);

@@ -1,4 +1,4 @@
-//! Records of the filter's steps for smoothing.
+//! Tests of the filter's records for smoothing.
 
 use super::rig::{IMU, Rig, at, cruise};
 use crate::Navigation as _;
@@ -16,12 +16,12 @@ fn steps(reader: &JournalReader) -> Vec<Placed> {
     core::iter::from_fn(|| reader.next()).map(|words| Placed::of_words(&words).unwrap()).collect()
 }
 
-/// Groups the steps by piece and clock.
+/// Groups the steps by piece; returns the numbers of piece and clock with each group.
 fn pieces(steps: &[Placed]) -> Vec<((u32, u32), &[Placed])> {
     steps.chunk_by(|a, b| a.piece == b.piece).map(|piece| ((piece[0].piece, piece[0].clock), piece)).collect()
 }
 
-/// Whether each step begins where the previous one ends, and only the last one is an end.
+/// Whether each step begins where the previous one ends, and only the last step is an end.
 fn is_whole(piece: &[Placed]) -> bool {
     let is_end = |placed: &&Placed| matches!(placed.step.by, Move::End);
     piece.windows(2).all(|two| two[0].step.to == two[1].step.at)
@@ -41,7 +41,7 @@ fn drive_without_estimate_records_no_steps() {
     assert_eq!(steps(&reader).len(), 0);
 }
 
-/// A clock set back by more than 10 s ends the piece exactly once, even if no reading follows.
+/// A clock set back by more than 10 s ends a piece exactly once, even if no later reading follows.
 #[test]
 fn piece_is_recorded_to_its_end_and_ends_once() {
     let rig = Rig::new(cruise, 5);
@@ -59,7 +59,7 @@ fn piece_is_recorded_to_its_end_and_ends_once() {
     assert_eq!(found.iter().map(|(numbers, _)| *numbers).collect::<Vec<_>>(), [(1, 0)]);
     assert!(is_whole(found[0].1));
     let last = all.last().unwrap().step.at;
-    assert!(ended.since(last) < DurNs::from_secs_f64(1.0), "the last epochs are in it");
+    assert!(ended.since(last) < DurNs::from_secs_f64(1.0), "the last epochs must be recorded");
 }
 
 #[test]
@@ -75,5 +75,5 @@ fn clock_reset_starts_a_new_piece() {
     assert_eq!(found.iter().map(|(numbers, _)| *numbers).collect::<Vec<_>>(), [(1, 0), (2, 1)]);
     assert!(found.iter().all(|(_, piece)| is_whole(piece)));
     let last = all.last().unwrap().step.at;
-    assert!(at(20.0).since(last) < DurNs::from_secs_f64(0.1), "all that was heard is fused at the end");
+    assert!(at(20.0).since(last) < DurNs::from_secs_f64(0.1), "all readings must be fused at the end");
 }

@@ -1,4 +1,4 @@
-//! Verification that the process noise of an epoch equals that of the modelled processes.
+//! Verification that the process noise of an epoch equals the noise of the modelled random processes.
 
 use super::jacobians::Draws;
 use crate::filter::factors::Factors;
@@ -11,7 +11,7 @@ use crate::filter::state::{
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// A leg of a vehicle at rest, and the covariance it adds to zero.
+/// Returns a leg of a vehicle at rest, and the covariance that the leg adds to zero.
 fn leg(settings: &Settings, dt_s: f64, felt: InertialSample) -> (Transition, Factors<ERRORS>) {
     let mut state = Draws::new(1).state();
     let mut leg = Leg::default().with_noise([1.0; 2], settings.slack);
@@ -30,13 +30,13 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
     assert!((is - should).abs() <= share * should.abs() + 1e-18, "{what}: {is}, not {should}");
 }
 
-/// Two lags in series, s' = -s / T + r, r' = -r / T + w, in steps of 1e-5 T.
+/// The process is two lags in series, s' = -s / T + r, r' = -r / T + w. It is integrated in steps of 1e-5 T.
 ///
-/// Euler's method has an error of that order.
+/// Euler's method has an error of the order of the step.
 #[test]
 fn slack_noise_equals_an_integral_of_the_process() {
     let settings = Settings { slack: GaussMarkov { reach: 0.06, time_s: 10.0 }, ..Settings::default() };
-    // Density of w that gives s a variance of reach^2: 4 reach^2 / T^3.
+    // Density of w at which s has a variance of reach^2: 4 reach^2 / T^3.
     let density = 4.0 * 0.06 * 0.06 / 1e3;
     for lags in [0.01, 0.3, 1.0, 4.0] {
         let (_, factors) = leg(&settings, lags * 10.0, still());
@@ -50,7 +50,7 @@ fn slack_noise_equals_an_integral_of_the_process() {
                 rr - 2.0 * rr * step + density * dt_s,
             );
         }
-        // The first steps weigh more if there are few.
+        // If there are few steps, the error of the first ones matters more.
         let share = 1e-4 + 3.0 * step / lags;
         near("slack", factors.variance(SLACK), ss, share);
         near("both", factors.covariance(SLACK, SLACK_RATE), sr, share);
@@ -58,12 +58,13 @@ fn slack_noise_equals_an_integral_of_the_process() {
     }
 }
 
-/// In the steady state the slack has its reach, and its autocorrelation at x lags is (1 + x) e^-x.
+/// In the steady state, the slack has its declared variance. After x time constants, its autocorrelation is (1 + x)
+/// e^-x.
 #[test]
-fn slack_variance_settles_at_its_reach() {
+fn slack_variance_settles_at_the_declared_value() {
     let settings = Settings { slack: GaussMarkov { reach: 0.3, time_s: 7.0 }, ..Settings::default() };
     let mut factors = Factors::independent([0.0; ERRORS]);
-    // Epochs of uneven length, because the steady state must not depend on them.
+    // The epochs have different lengths, because the steady state must not depend on them.
     for k in 0..3000 {
         let (transition, noise) = leg(&settings, 0.03 + 0.02 * f64::from(k % 5), still());
         transition.carry(&mut factors);
@@ -88,12 +89,11 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
     factors.add_to(SLACK, noise.variance(SLACK) - sr * sr / rr);
 }
 
-/// Monte Carlo of white force and white turn rate through `State::go_on`: 4000 epochs of ten samples.
+/// The reference is 4000 random epochs of ten samples with white force and white turn rate, by `State::go_on`.
 ///
-/// The relative spread of a variance from n draws is sqrt(2 / n) = 2.2 %, so that the limit of 9 % is four of them.
-/// Displacement and velocity are correlated. Turn rate noise also tilts the force, which the epoch neglects. So the
-/// unit is level, and only its own x axis is checked. Gravity has no first-order effect there when the unit tilts
-/// about x.
+/// The relative spread of a variance from n draws is sqrt(2 / n) = 2.2 %, so the limit of 9 % is four standard
+/// deviations. Turn rate noise also tilts the force, which the process noise of an epoch neglects. So the unit is
+/// level and only tilts about x, and only its x axis is checked: gravity has no first-order effect there.
 #[test]
 fn white_noise_equals_monte_carlo() {
     const DRAWS: u32 = 4000;
@@ -128,7 +128,7 @@ fn white_noise_equals_monte_carlo() {
     }
 }
 
-/// Without gyro and accelerometer data, the blind noises apply for that time.
+/// For the time without gyro and accelerometer data, the blind noise applies.
 #[test]
 fn blind_noise_applies_without_inertial_data() {
     let settings = Settings { blind_rate_noise: 0.03, blind_force_noise: 0.5, ..Settings::default() };
@@ -140,11 +140,11 @@ fn blind_noise_applies_without_inertial_data() {
     }
 }
 
-/// A decaying error keeps its reach because the epoch's noise makes up for the decay.
+/// A decaying error keeps its variance, because the noise of each epoch makes up for the decay.
 ///
 /// A random walk grows with time.
 #[test]
-fn decaying_errors_keep_their_reach() {
+fn decaying_errors_keep_their_standard_deviation() {
     let settings = Settings::default();
     let reaches = [
         (FORCE_BIAS, settings.force_bias.reach),
@@ -164,7 +164,7 @@ fn decaying_errors_keep_their_reach() {
     }
     near("scale", factors.variance(SCALE), settings.scale_noise * settings.scale_noise * 25e3, 1e-9);
     near("depth", factors.variance(DEPTH), settings.depth_noise * settings.depth_noise * 25e3, 1e-9);
-    // After one time constant, 1/e is left.
+    // After one time constant, 1/e of the error is left.
     let (transition, _) = leg(&settings, settings.heading.time_s, still());
     let mut column = [1.0; ERRORS];
     transition.apply(&mut column);

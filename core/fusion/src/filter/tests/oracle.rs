@@ -1,7 +1,8 @@
-//! Factors compared with 100-digit values: `tests/oracles/fusion.py` made `fusion.csv` with mpmath.
+//! Comparison of factored covariances with 100-digit values, which `tests/oracles/fusion.py` computed with mpmath.
 //!
-//! Inputs are doubles taken as exact, so that each tolerance bounds the rounding within the computation. Elements of
-//! a covariance are compared relative to sqrt(P_ii P_jj), the scale of these two errors.
+//! The inputs in `fusion.csv` are doubles that count as exact, so each tolerance bounds the rounding of the
+//! computation only. Elements of a covariance are compared relative to sqrt(P_ii P_jj), which is the scale of the
+//! two errors.
 
 use super::super::factors::{Factors, Gain};
 use headrace_geometry::math;
@@ -9,7 +10,7 @@ use headrace_support::hard_cases::found_at;
 
 const LINES: &str = include_str!("../../../../../tests/oracles/fusion.csv");
 
-/// A covariance that follows the steps of the file.
+/// A representation of a covariance that can execute the steps of the file.
 trait Covariance<const N: usize> {
     fn start(variances: [f64; N]) -> Self;
     fn element(&self, i: usize, j: usize) -> f64;
@@ -57,12 +58,12 @@ impl<const N: usize> Covariance<N> for Factors<N> {
     }
 }
 
-/// The full covariance with the textbook update, or with the Joseph form if `JOSEPH`.
+/// The full covariance, updated by the textbook form, or by the Joseph form if `JOSEPH`.
 #[derive(Clone, Copy)]
 struct Whole<const N: usize, const JOSEPH: bool>([[f64; N]; N]);
 
 impl<const N: usize, const JOSEPH: bool> Whole<N, JOSEPH> {
-    /// F P F^T.
+    /// Product F P F^T.
     fn carried(&self, f: &[[f64; N]; N]) -> Self {
         let half: [[f64; N]; N] =
             f.map(|row| core::array::from_fn(|j| (0..N).map(|k| row[k] * self.0[k][j]).sum()));
@@ -123,18 +124,18 @@ impl<const N: usize, const JOSEPH: bool> Covariance<N> for Whole<N, JOSEPH> {
     }
 }
 
-/// Largest error of a covariance, in its own scale.
+/// Largest error of a covariance, relative to the scale of its errors.
 #[derive(Debug, Default, Clone, Copy)]
 struct Worst {
     covariance: f64,
     gain: f64,
     distance: f64,
-    /// Largest variance over the smallest, of those that the steps must give.
+    /// Ratio of the largest to the smallest variance in the expected covariances.
     spread: f64,
     is_sign_lost: bool,
 }
 
-/// NaN counts as the largest error.
+/// NaN counts as the largest possible error.
 fn note(worst: &mut f64, off: f64) {
     *worst = if off.is_nan() { f64::INFINITY } else { worst.max(off) };
 }
@@ -172,7 +173,7 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
             "scale" => p.scale(fields[3].parse().unwrap(), numbers[1]),
             "gain" => {
                 note(&mut worst.gain, (gain.variance / numbers[0] - 1.0).abs());
-                // Relative to the largest element, because the gains of one measurement act together.
+                // The gain is compared relative to its largest element, because all elements act together.
                 let size = numbers[1..].iter().fold(0.0, |size: f64, k| size.max(k.abs()));
                 for (k, right) in gain.k.iter().zip(&numbers[1..]) {
                     note(&mut worst.gain, (k - right).abs() / size);
@@ -210,7 +211,7 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
     worst
 }
 
-/// Errors of the factors, of the plain form, and of Joseph's form.
+/// Returns the largest errors of the factors, of the textbook form and of the Joseph form.
 fn all(case: &str, n: usize) -> [Worst; 3] {
     fn of<const N: usize>(case: &str) -> [Worst; 3] {
         [follow::<N, Factors<N>>(case), follow::<N, Whole<N, false>>(case), follow::<N, Whole<N, true>>(case)]
@@ -218,10 +219,10 @@ fn all(case: &str, n: usize) -> [Worst; 3] {
     if n == 4 { of::<4>(case) } else { of::<6>(case) }
 }
 
-/// Cases, and the tolerance of the factors in each: about ten times their error.
+/// Name and size of each case, and the tolerance of the factors: about ten times their error.
 ///
-/// Doubles allow some units in the last place times the ratio of the largest to the smallest standard deviation in
-/// any direction. That ratio is 1e12 after ten hours.
+/// The rounding error is some units in the last place, times the ratio of the largest to the smallest standard
+/// deviation in any direction. This ratio is 1e12 after ten hours.
 const CASES: [(&str, usize, f64); 13] = [
     ("mild", 4, 1e-14),
     ("mild", 6, 1e-14),
@@ -237,7 +238,7 @@ const CASES: [(&str, usize, f64); 13] = [
     ("swinging", 4, 1e-9),
     ("swinging", 6, 1e-5),
 ];
-/// The full covariance fails a case if its error is this many times the tolerance of the factors.
+/// Multiple of the factors' tolerance above which the full covariance counts as failed.
 const FAILS: f64 = 30.0;
 
 #[test]
@@ -263,7 +264,7 @@ fn full_covariance_fails_cases_that_factors_pass() {
             assert!(fails(plain), "{case} {n}: {plain:?}");
             assert!(fails(joseph), "{case} {n}: {joseph:?}");
         }
-        // In an easy case both full forms are right, too.
+        // In an easy case, both full forms are also right.
         if case == "mild" {
             assert!(plain.covariance.max(joseph.covariance) < 1e-13, "{plain:?} {joseph:?}");
         }

@@ -26,11 +26,11 @@ fn reading(number: f64) -> Reading {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Each reading leaves the window once, in order of validity.
+    /// Each reading leaves the window exactly once, in order of validity.
     ///
-    /// Readings of the same time leave in order of arrival.
+    /// Readings with the same time of validity leave in order of arrival.
     #[test]
-    fn readings_leave_the_window_in_order(times in proptest::collection::vec(0_u64..50, 1..200), cut in 0_u64..50) {
+    fn readings_leave_the_window_once_in_order_of_validity(times in proptest::collection::vec(0_u64..50, 1..200), cut in 0_u64..50) {
         let mut window = Window::default();
         for (k, at) in times.iter().enumerate() {
             let taken = window.take(Waiting { at: MonoNs(*at), source: k, reading: reading(k as f64) });
@@ -50,10 +50,11 @@ proptest! {
         prop_assert_eq!(left, right);
     }
 
-    /// Inertial data cover any time without a gap. A sample is valid for the time before it, for at most a tenth of a
-    /// second.
+    /// Inertial data cover all times without a gap.
+    ///
+    /// A sample is valid for the time before it, for at most a tenth of a second.
     #[test]
-    fn inertial_data_cover_all_time(
+    fn inertial_data_cover_all_times_without_a_gap(
         samples in proptest::collection::vec((1_u64..3000, any::<bool>()), 0..60),
         from in 0_u64..3000,
         length in 1_u64..1000,
@@ -87,18 +88,18 @@ proptest! {
                 prop_assert!(!is_blind || next > now.0 + 100 * MS, "a sample is ignored");
             }
         }
-        // Removing old samples has no effect on later ones.
+        // Removal of old samples does not change the data after them.
         let old = MonoNs(forgotten.min(from) * MS);
         let mut younger = window.clone();
         younger.forget(old);
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// Echoes from a position in the section lead back to it from half a metre away.
+    /// From a start half a metre away, a fit to the echoes of a position ends at this position.
     ///
-    /// Nonsense never leads outside.
+    /// With arbitrary ranges, the fit still ends inside the tunnel.
     #[test]
-    fn echoes_lead_to_their_position(
+    fn fit_to_echoes_finds_their_position(
         (y, z) in (-2.5_f64..2.5, 1.5_f64..6.0),
         (off_y, off_z) in (-0.4_f64..0.4, -0.4_f64..0.4),
         (roll, pitch, yaw) in (-0.1_f64..0.1, -0.2_f64..0.2, -0.3_f64..0.3),
@@ -125,7 +126,8 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// Used readings of a source that sends too often are one period apart, and no more than needed.
+    /// If a source sends too often, its used readings are at least one period apart. No reading is skipped without
+    /// need.
     #[test]
     fn source_is_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
@@ -142,10 +144,11 @@ proptest! {
         prop_assert!(used.windows(2).all(|pair| pair[1].since(pair[0]) >= period));
     }
 
-    /// Turns of a head are counted in both directions and across the wrap. Used pings with a range are one step
-    /// apart.
+    /// The turn rate of a head is right in both directions and across the wrap of the angle.
+    ///
+    /// Used pings have a range and are at least one step apart.
     #[test]
-    fn head_is_used_once_per_step(step_deg in 0.3_f64..5.0, clockwise in any::<bool>(), start in -10.0_f64..10.0) {
+    fn returns_of_a_head_are_used_once_per_angle_step(step_deg in 0.3_f64..5.0, clockwise in any::<bool>(), start in -10.0_f64..10.0) {
         let step_rad = step_deg.to_radians() * if clockwise { 1.0 } else { -1.0 };
         let wanted_rad = 3.0_f64.to_radians();
         let mut turning = Turning::default();
@@ -213,7 +216,7 @@ fn unit(i: usize) -> Errors {
     core::array::from_fn(|j| f64::from(u8::from(i == j)))
 }
 
-/// Transition F of a leg as a full matrix.
+/// Returns the transition F of a leg as a full matrix.
 fn whole(transition: &Transition) -> Square {
     transposed(&core::array::from_fn(|j| {
         let mut column = unit(j);
@@ -222,10 +225,10 @@ fn whole(transition: &Transition) -> Square {
     }))
 }
 
-/// The textbook form: each clone's errors augment the present ones, and no measurement corrects them.
+/// The textbook form: the errors of each clone augment the present errors, and measurements do not correct them.
 struct Augmented {
     now: Square,
-    /// Covariance of the errors at that time, and their cross-covariance with the present ones.
+    /// Covariance of the errors at the time of each clone, and their cross-covariance with the present errors.
     clones: Vec<(Square, Square)>,
 }
 
@@ -248,7 +251,8 @@ impl Augmented {
         }
     }
 
-    /// Standard deviation of the difference in chainage at `arm` between now and the clone `back` before the newest.
+    /// Standard deviation of the difference in chainage, at `arm`, between now and the clone `back` before the
+    /// newest one.
     fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];
@@ -264,7 +268,7 @@ impl Augmented {
 
 #[test]
 fn clones_equal_an_augmented_filter() {
-    // Several legs between clones, and enough clones for the ring buffer to wrap.
+    // The first case has several legs between clones. The second has enough clones to fill the ring buffer.
     for (legs, leg_s, times) in [(8, 0.25, 12), (1, 2.0, 70)] {
         let settings = Settings::default();
         let rig = Rig::new(super::rig::cruise, 5);

@@ -6,8 +6,9 @@ use crate::filter::state::{ERRORS, Errors, RATE_BIAS, State, VELOCITY};
 use headrace_geometry::frames::{Point3, Rot, Vec3};
 use headrace_geometry::time::MonoNs;
 
-/// An estimate with this speed along one axis and the uncertainty of rest: 0.02 m/s, and 1e-3 rad/s for the gyro
-/// bias.
+/// Returns an estimate that moves at this speed along one axis, with a standard deviation of 0.02 m/s.
+///
+/// The standard deviation of the gyro bias is 1e-3 rad/s.
 fn moving(axis: usize, speed_mps: f64) -> Eskf {
     let mut variances: Errors = [0.0; ERRORS];
     variances[VELOCITY..VELOCITY + 3].fill(0.02 * 0.02);
@@ -20,7 +21,7 @@ fn moving(axis: usize, speed_mps: f64) -> Eskf {
     eskf
 }
 
-/// A difference of two equal normal errors of 0.02 m/s exceeds 0.11 m/s once in ten thousand times.
+/// The difference of two normal errors with an sd of 0.02 m/s each exceeds 0.11 m/s once in ten thousand times.
 #[test]
 fn moving_vehicle_is_not_at_rest_in_any_direction() {
     let turn = Vec3::new(2e-3, -4e-3, 6e-3);
@@ -28,10 +29,10 @@ fn moving_vehicle_is_not_at_rest_in_any_direction() {
         let mut moves = moving(axis, side * 0.115);
         let before = moves.state;
         moves.rest(Some(turn));
-        assert_eq!(moves.state, before, "{axis} {side}: it moves and may turn");
+        assert_eq!(moves.state, before, "{axis} {side}: a moving vehicle must not be corrected");
         let mut stands = moving(axis, side * 0.105);
         stands.rest(Some(turn));
-        // Both have the same uncertainty, so the result is the mean of both.
+        // Estimate and measurement have the same uncertainty, so the result is the mean of both.
         let half = stands.state.velocity_mps.scaled(2.0) + -before.velocity_mps.scaled(0.105 / 0.115);
         assert!(half.norm() < 1e-12, "{axis} {side}: {:?}", stands.state.velocity_mps);
         let bias = stands.state.rate_bias_radps + -turn.scaled(0.5);

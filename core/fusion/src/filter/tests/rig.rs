@@ -1,4 +1,4 @@
-//! A vehicle of known trajectory and its sensors' readings, for tests that drive the filter by hand.
+//! A vehicle on a known trajectory with the readings of its sensors, for tests that feed readings to the filter.
 
 use super::super::FilterNavigation;
 use super::super::settings::{GaussMarkov, Settings};
@@ -17,19 +17,19 @@ pub(super) const TETHER: usize = 1;
 pub(super) const DEPTH: usize = 2;
 /// First of four echosounders: left, right, down, up.
 pub(super) const ECHOES: usize = 3;
-/// First of two heads: one looks ahead, one back.
+/// First of two heads; one head is yawed ahead and the other one back.
 pub(super) const HEADS: usize = 7;
 pub(super) const VELOCITY_LOG: usize = 9;
-/// A source unused by navigation.
+/// A source that navigation does not use.
 pub(super) const OTHER: usize = 10;
 
 /// Timestamp of the rig's time 0 s.
 const ORIGIN: MonoNs = MonoNs(5_000_000_000_000);
 const DEVICE_MPS: f64 = 1500.0;
-/// Largest error of the filter, in its own sd.
+/// Maximum error of the filter, in standard deviations.
 const MOST_SDS: f64 = 4.0;
 
-/// A reading in transit.
+/// A reading with its times of arrival and of validity.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Event {
     pub(super) received: MonoNs,
@@ -41,13 +41,13 @@ pub(super) struct Event {
 /// Trajectory: pose of the vehicle at a time, s.
 pub(super) type Way = fn(f64) -> Pose;
 
-/// Simulated vehicle and sensors.
+/// A simulated vehicle with its sensors.
 pub(super) struct Rig {
     pub(super) profile: Profile,
     pub(super) site: Site,
     pub(super) settings: Settings,
     pub(super) way: Way,
-    /// Noise of the sensors relative to the settings.
+    /// Factor of the sensors' noise relative to the settings.
     pub(super) noise: f64,
     /// Time between samples of the inertial unit, s.
     pub(super) imu_s: f64,
@@ -74,14 +74,14 @@ pub(super) fn cruise(t: f64) -> Pose {
     }
 }
 
-/// At rest, level, facing along the tunnel.
+/// Vehicle at rest, level, facing along the tunnel.
 pub(super) fn rest(_: f64) -> Pose {
     Pose { position: Point3::new(3.0, 0.4, 4.0), attitude: Rot::identity() }
 }
 
 impl Rig {
     pub(super) fn new(way: Way, seed: u64) -> Self {
-        // Narrow beams, equivalent to rays, and a cable whose slack changes slowly.
+        // Settings for narrow beams, which equal rays, and for a cable whose slack changes slowly.
         let slack = GaussMarkov { reach: 0.06, time_s: 10.0 };
         let settings = Settings { slack, return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() };
         let site = Site { axis_yaw_rad: 0.7, ..Site::default() };
@@ -115,7 +115,7 @@ impl Rig {
         SensorInfo { mount, kind }
     }
 
-    /// Readings of all sensors except the velocity log over a time span, in order of validity.
+    /// Returns the readings of all sensors except the velocity log in a time span, in order of validity.
     pub(super) fn events(&self, from_s: f64, to_s: f64) -> Vec<Event> {
         let mut events = Vec::new();
         let mut every = |period_s: f64, phase_s: f64, source: usize, what: &dyn Fn(f64) -> Reading| {
@@ -146,7 +146,7 @@ impl Rig {
         nav.update(event.source, &Self::sensor(event.source), times, &event.reading);
     }
 
-    /// Feeds all readings to the filter and checks it after each.
+    /// Feeds all readings to the filter, and checks the filter after each reading.
     pub(super) fn run(&self, nav: &mut FilterNavigation, events: &[Event]) -> Tally {
         let mut tally = Tally::default();
         for event in events {
@@ -156,10 +156,10 @@ impl Rig {
         tally
     }
 
-    /// Checks the invariants of the filter: finite numbers, positive variances, and no fix or one that is right by
-    /// its own sd.
+    /// Checks that all numbers are finite, variances are not negative, and errors are within `MOST_SDS` if there is
+    /// a fix.
     ///
-    /// It checks once per epoch, since nothing changes in between.
+    /// It checks once per epoch, because nothing changes in between.
     pub(super) fn check(&self, nav: &FilterNavigation, now: MonoNs, tally: &mut Tally) {
         let Some(running) = nav.running() else {
             assert!(nav.fix(now).is_err());
@@ -205,7 +205,7 @@ impl Rig {
         for (k, axis) in axes.iter().enumerate() {
             let mut h = [0.0; ERRORS];
             (h[POSITION + k], h[VELOCITY + k]) = (1.0, since_s);
-            // The body's origin moves with the attitude error, by axis x arm.
+            // An attitude error moves the body's origin by axis x arm.
             for (j, other) in axes.iter().enumerate() {
                 h[ATTITUDE + j] = other.cross(&arm).dot(axis);
             }
@@ -221,7 +221,7 @@ impl Rig {
     }
 
     pub(super) fn noisy(&self, t: f64, salt: u64, sd: f64) -> f64 {
-        // Sum of twelve uniform numbers from a hashed counter (splitmix64).
+        // The noise is a sum of twelve uniform numbers from a hashed counter (splitmix64).
         let mut state = self.seed ^ at(t).0.wrapping_mul(31) ^ (salt << 50);
         let sum: f64 = (0..12)
             .map(|_| {
@@ -269,12 +269,12 @@ impl Rig {
         Reading::SpecificForce(Self::sensor(IMU).mount.rotation.inverse() * in_body + noise)
     }
 
-    /// Attitude computed by the unit.
+    /// Attitude that the unit computes.
     pub(super) fn attitude(&self, t: f64) -> Reading {
         Reading::Attitude(self.level(t, 0.0))
     }
 
-    /// The same, with a compass deviation.
+    /// Attitude that the unit computes with a compass deviation.
     pub(super) fn level(&self, t: f64, off_rad: f64) -> Rot<Level, Sensor> {
         let noise = Vec3::new(
             self.noisy(t, 30, self.settings.tilt_sd_rad / 2.0),
@@ -337,11 +337,11 @@ impl Rig {
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Tally {
     checked: Option<MonoNs>,
-    /// Epochs with a fix, and without.
+    /// Number of epochs with a fix, and number of epochs without.
     pub(super) fixes: u32,
     pub(super) lacking: u32,
-    /// Missing part in the last epoch without a fix.
+    /// Part of the fix that was missing in the last epoch without one.
     pub(super) lacks: Option<NoFix>,
-    /// Largest error, in sd.
+    /// Largest error, in standard deviations.
     pub(super) sd: f64,
 }

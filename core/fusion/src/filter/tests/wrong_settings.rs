@@ -1,4 +1,4 @@
-//! Detection of wrong settings by the filter alone, in a dive of some minutes.
+//! Detection of wrong settings in a dive of some minutes, by the filter alone.
 
 use super::super::FilterNavigation;
 use super::super::setting_check::{Setting, SettingDoubt};
@@ -6,7 +6,7 @@ use super::rig::{HEADS, Rig, cruise};
 use crate::Navigation as _;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// Returns the doubt after four minutes with all echoes scaled and each head's returns changed.
+/// Returns the doubt about settings after four minutes. All echoes are scaled, and each head's returns are changed.
 fn doubted(echoes: f64, change: impl Fn(usize, SonarReturn) -> SonarReturn) -> Option<SettingDoubt> {
     let rig = Rig::new(cruise, 3);
     let mut nav: FilterNavigation = rig.navigation();
@@ -40,7 +40,7 @@ fn scaled_ranges_are_reported_with_their_scale() {
 }
 
 #[test]
-fn rotated_head_is_named_with_its_angle() {
+fn rotated_head_is_reported_with_its_angle() {
     for (head, turned_rad) in [(0, 0.1), (1, -0.08)] {
         let turn = |number, sonar: SonarReturn| {
             let off_rad = if number == head { turned_rad } else { 0.0 };

@@ -3,7 +3,7 @@ use headrace_geometry::frames::Vec3;
 
 const PERIOD: DurNs = DurNs(2_500_000);
 const TICK: DurNs = DurNs(100_000);
-/// Number of samples after which a unit's stamps are known to come first.
+/// Number of samples after which a unit is known to send its stamps first.
 const FIRST: i64 = 30;
 
 fn force() -> Reading {
@@ -14,7 +14,7 @@ fn rate() -> Reading {
     Reading::AngularRate(Vec3::zero())
 }
 
-/// Samples every 2.5 ms whose messages have these delays; returns the times of their forces.
+/// Returns the true and corrected times of samples that are made every 2.5 ms and arrive with these delays.
 fn times(delays_ns: &[i64], ticks_of: impl Fn(i64) -> i64) -> Vec<(MonoNs, MonoNs)> {
     let mut times = SampleTimes::new(32, TICK);
     let of = |(k, delay_ns): (i64, &i64)| {
@@ -32,21 +32,21 @@ fn in_step(k: i64) -> i64 {
 }
 
 #[test]
-fn punctual_samples_are_valid_on_arrival() {
+fn punctual_samples_keep_their_receive_times() {
     let delays: Vec<i64> = (0..4000).map(|k| 300_000 + k * 37 % 700_000).collect();
     for (k, (made, at)) in times(&delays, in_step).iter().enumerate().skip(30) {
         assert_eq!(at.since(*made).0, delays[k], "sample {k}");
     }
 }
 
-/// Largest time error after the first seconds, ns.
+/// Largest time error after the first 4000 samples, ns.
 fn worst_ns(times: &[(MonoNs, MonoNs)]) -> i64 {
     times.iter().skip(4000).map(|(made, at)| at.since(*made).0.abs()).max().unwrap()
 }
 
 #[test]
 fn samples_of_a_burst_are_separated() {
-    // Every tenth sample waits 25 ms, and the following ones arrive with it.
+    // Of every forty samples, one waits 25 ms and the nine after it arrive at the same time.
     let burst = |k: i64| if k % 40 < 10 { (10 - k % 40) * PERIOD.0 } else { 0 };
     let delays: Vec<i64> = (20..20_020).map(burst).collect();
     let off = worst_ns(&times(&delays, in_step));
@@ -79,16 +79,16 @@ fn garbled_stamp_affects_only_its_own_sample() {
 }
 
 #[test]
-fn stopped_or_restarted_clock_corrects_only_briefly() {
+fn stopped_clock_moves_few_samples_and_restarted_clock_none() {
     let none = vec![0; 4000];
     let stuck = times(&none, |k| in_step(k.min(1000)));
     let put_back = stuck.iter().filter(|(made, at)| made != at).count();
-    assert!(put_back <= 60, "{put_back} samples of 3000, 150 ms");
+    assert!(put_back <= 60, "{put_back} of 3000 samples are corrected; 60 (150 ms) are allowed");
     let again = times(&none, |k| in_step(if k < 2000 { k + 80_000 } else { k - 2000 }));
     assert!(again.iter().all(|(made, at)| made == at));
 }
 
-/// Samples every 10 ms whose stamp comes before or after rate and force; returns their corrected times.
+/// Returns the corrected times of samples every 10 ms, whose stamp comes before or after rate and force.
 fn stamped(times: &mut SampleTimes, count: u64, is_first: bool) -> Vec<MonoNs> {
     let mut got = Vec::new();
     for k in 0..count {
@@ -123,7 +123,7 @@ fn stamp_belongs_to_the_first_reading_of_each_kind() {
 }
 
 #[test]
-fn trailing_stamp_belongs_to_no_later_reading() {
+fn stamps_sent_after_readings_change_no_times() {
     let mut times = SampleTimes::new(32, TICK);
     let got = stamped(&mut times, 200, false);
     let right = (0..200).flat_map(|k| [MonoNs(1_000_000_000 + k * 10_000_000); 2]);
