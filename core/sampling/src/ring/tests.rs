@@ -51,7 +51,7 @@ fn t_max_equals_the_reference_table() {
     }
 }
 
-/// The closed forms hold on a flat floor and on a circle to 1e-12 of their values.
+/// At chainage 7 km, the closed forms hold on a flat floor and on a circle to 1e-12 of their values.
 #[test]
 fn ray_casting_agrees_with_the_closed_forms() {
     let square = shapes::rectangle(4.0, 4.0).unwrap();
