@@ -156,9 +156,9 @@ pub struct Outlook {
 /// Change of the frontier by one ping or update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections that have just left the zone behind it.
+    /// Sections that are newly behind the zone.
     pub left_behind: Range<i64>,
-    /// Sections that have just left the zone ahead of it: the vehicle moves backwards.
+    /// Sections that are newly ahead of the zone, because the vehicle moves backwards.
     pub left_ahead: Range<i64>,
     /// Whether the coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,

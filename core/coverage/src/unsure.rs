@@ -189,7 +189,7 @@ mod tests {
         let mut stretch = one(Unsure::Position, 10, 0.4);
         assert!(stretch.join(&one(Unsure::Position, 11, 0.6), 0.25));
         assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25), "eight sections lie between them");
-        assert!(!stretch.join(&one(Unsure::Position, 21, 0.5), 0.25), "nine");
+        assert!(!stretch.join(&one(Unsure::Position, 21, 0.5), 0.25), "nine sections lie between them");
         assert!(!stretch.is_beyond(20..21, 0.25) && stretch.is_beyond(21..22, 0.25));
         assert!(!stretch.is_beyond(-8..-7, 0.25) && stretch.is_beyond(-9..-8, 0.25));
         assert!(!stretch.join(&one(Unsure::DoubtfulReturns, 12, 0.5), 0.25), "another reason");

@@ -25,12 +25,14 @@ impl DurNs {
     /// Zero duration.
     pub const ZERO: Self = Self(0);
 
-    /// Whole milliseconds; saturates beyond 292 years.
+    /// Creates a duration of whole milliseconds; saturates beyond 292 years.
     pub const fn from_millis(millis: i64) -> Self {
         Self(millis.saturating_mul(1_000_000))
     }
 
-    /// Seconds rounded to the nearest nanosecond; NaN gives zero, and values beyond 292 years saturate.
+    /// Creates a duration from seconds, rounded to the nearest nanosecond.
+    ///
+    /// NaN gives zero, and values beyond 292 years saturate.
     #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
     pub fn from_secs_f64(seconds: f64) -> Self {
         Self(libm::rint(seconds * NS_PER_S) as i64)

@@ -80,7 +80,7 @@ enum Pattern {
     Sectors {
         /// The longest period of a sweep there and back, seconds.
         sweep_s: f64,
-        /// See [`Passes::uneven_ends`].
+        /// Unevenness at shared ends, as in [`Passes::uneven_ends`].
         uneven: f64,
     },
     /// Heads turn in opposite senses or at different rates.

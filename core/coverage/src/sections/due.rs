@@ -285,10 +285,10 @@ mod tests {
             })
         };
         let open = Verdict::Open;
-        assert_eq!(at(0.6, 2.3, 0.0, open, false), [(9, false)], "as a whole: it is 0.95 m away");
-        assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of it");
-        assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m for certain");
-        assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of it");
+        assert_eq!(at(0.6, 2.3, 0.0, open, false), [(9, false)], "the whole hole is out of reach");
+        assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of the hole is out of reach");
+        assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m is out of reach for certain");
+        assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of the hole is out of reach");
         assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "no section is open");
         assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "the section is already flagged");
     }
@@ -343,7 +343,10 @@ mod tests {
             tell: &mut |_, _| {},
         };
         let everywhere = Request { not_passed: None, ..request };
-        assert!(!sections.fails_already(&everywhere, &mut judging), "only where some heads haven't passed");
+        assert!(
+            !sections.fails_already(&everywhere, &mut judging),
+            "only wall that some heads missed counts"
+        );
         sections.fails_already(&request, &mut judging)
     }
 
@@ -368,6 +371,6 @@ mod tests {
             // At other places on the wall, the circle would need to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
-        assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in it");
+        assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in the circle");
     }
 }

@@ -381,7 +381,7 @@ fn swing_widens_gaps_between_heads_apart_along_the_hull() {
 fn position_error_lowers_the_speed_by_its_margin() {
     let mut case = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
     let sure = case.advice();
-    // Of the standard deviation of 17 mm, 2 mm need no margin. Twice the remaining 15 mm takes 3 cm of the half
+    // The first 2 mm of the standard deviation of 17 mm need no margin. Twice the other 15 mm takes 3 cm of the half
     // metre.
     case.situation.pass_error_m = 0.017;
     let unsure = case.advice();
@@ -570,7 +570,7 @@ fn nearest_and_highest_speed_intervals_are_advised() {
     );
 }
 
-/// Where heads run out of phase just above the largest speed, the margin is up to 2 % instead of 1 %.
+/// The margin is up to 2 % instead of 1 % if heads run out of phase just above the largest speed.
 ///
 /// A vehicle 2 % above the advised speed then exceeds the target by at most 2 %.
 #[test]

@@ -73,7 +73,7 @@ impl<'a> Thin<'a> {
         if needed > 1.0 { self.passes.time_for_s(seen_by, gap_s, needed) } else { gap_s }
     }
 
-    /// See [`Passes::uneven_ends`].
+    /// Unevenness at shared ends, as in [`Passes::uneven_ends`].
     pub(super) fn uneven_ends(&self) -> Option<f64> {
         self.passes.uneven_ends()
     }

@@ -12,7 +12,7 @@ fn polygon(radii: &[f64]) -> Profile {
     Profile::polygon(&points.collect::<Vec<_>>(), Some([0.0, 3.0])).unwrap()
 }
 
-/// The same curve as `profile`, without a tree.
+/// Returns the same curve without a tree.
 fn plain(profile: &Profile) -> Profile {
     Profile { tree: Tree::default(), support: None, ..profile.clone() }
 }
