@@ -229,7 +229,7 @@ pub mod array {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::{Serialize, Serializer};
 
-    /// Serializes the array as a list.
+    /// Serialises the array as a list.
     pub fn serialize<S: Serializer, T: Serialize, const N: usize>(
         array: &[T; N],
         to: S,
@@ -237,7 +237,7 @@ pub mod array {
         to.collect_seq(array)
     }
 
-    /// Deserializes a list of `N` elements.
+    /// Deserialises a list of `N` elements.
     pub fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
         from: D,
     ) -> Result<[T; N], D::Error> {
