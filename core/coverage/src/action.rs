@@ -4,17 +4,18 @@ use serde::{Serialize, Serializer};
 
 use super::cause::Cause;
 
-/// Change to make when a failed stretch is passed again.
+/// Change to make when the vehicle passes a failed stretch again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
     /// Drive slower.
     Slower,
-    /// Use a mode with a finer angular step: lower speed does not help.
+    /// Use a mode with a finer angular step, since a lower speed does not help.
     FinerMode,
     /// Set a longer range.
     LongerRange,
-    /// Roll the vehicle so that it occludes another part of the wall. Turning round would occlude the same
-    /// part.
+    /// Roll the vehicle so that it occludes another part of the wall.
+    ///
+    /// If the vehicle turned round, it would occlude the same part.
     OtherSide,
     /// Stay centred in the tunnel, with a steady heading.
     Middle,
@@ -26,7 +27,9 @@ pub enum Action {
     HeadBack,
     /// Restore the position fix first.
     Position,
-    /// Raise the gain: losses are so many, or so persistent on the same wall, that lower speed does not help.
+    /// Raise the gain.
+    ///
+    /// The losses are so many, or so persistent on the same wall, that a lower speed does not help.
     HigherGain,
     /// Change nothing: pass the stretch again from end to end.
     Again,
@@ -50,7 +53,7 @@ impl Action {
 
     /// Actions against several causes, in the order of the causes and without duplicates.
     ///
-    /// With `is_beyond_speed`, no speed makes up for the missing returns.
+    /// `is_beyond_speed` means that no speed makes up for the missing returns.
     pub fn against(causes: impl IntoIterator<Item = Cause>, is_beyond_speed: bool) -> Vec<Self> {
         let mut actions: Vec<Self> = Vec::new();
         for cause in causes {

@@ -1,4 +1,4 @@
-//! Speed and prospects for passing a missed stretch again.
+//! Speed for passing a missed stretch again, and whether speed helps.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,31 +8,33 @@ use super::causes::Causes;
 /// Speed for passing a missed stretch again, and whether speed helps at all.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Again {
-    /// Largest speed that meets the target wherever a speed can, m/s. Zero if no speed helps most sections.
+    /// Largest speed that meets the target in all sections where a speed can, m/s.
+    ///
+    /// Zero if no speed helps most sections.
     pub at_most_mps: f64,
-    /// No speed makes up for the missing returns in at least a tenth of the sections.
+    /// Whether no speed makes up for the missing returns in at least a tenth of the sections.
     pub is_beyond_speed: bool,
 }
 
-/// A remedy is named if at least one failed section in this many needs it.
+/// A remedy is advised if at least one in this number of failed sections needs the remedy.
 pub(super) const NAMED_OF: u32 = 10;
 
 /// A failed section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Failing {
-    /// Causes assigned to it.
+    /// Causes assigned to the section.
     pub causes: Causes,
-    /// Speed that meets the target there, m/s. Zero if no speed does.
+    /// Speed that meets the target in the section, m/s; zero if no speed does.
     pub again_mps: f64,
 }
 
 /// Counts of failed sections by remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
-    /// Sections that a speed can mend, and the lowest such speed, m/s.
+    /// Number of sections in which a speed meets the target, and the lowest of these speeds, m/s.
     mended: u32,
     least_mps: f64,
-    /// Sections whose missing returns no speed makes up for.
+    /// Number of sections in which no speed makes up for the missing returns.
     beyond: u32,
 }
 
@@ -65,15 +67,17 @@ impl Tally {
         self.beyond += u32::from(section.is_beyond());
     }
 
-    /// Removes a section. Returns true if it may have been the only one with the lowest speed, which must
-    /// then be found again.
+    /// Removes a section from the counts.
+    ///
+    /// Returns true if the section may have been the only one with the lowest speed. The caller must then find the
+    /// lowest speed again.
     pub(super) fn remove(&mut self, section: &Failing) -> bool {
         self.mended = self.mended.saturating_sub(u32::from(section.is_mended()));
         self.beyond = self.beyond.saturating_sub(u32::from(section.is_beyond()));
         section.is_mended() && section.again_mps <= self.least_mps
     }
 
-    /// Whether the section's speed is the lowest counted.
+    /// Whether the section's speed is the lowest of the counted speeds.
     pub(super) fn is_least(&self, section: &Failing) -> bool {
         section.is_mended() && section.again_mps <= self.least_mps
     }
@@ -88,7 +92,7 @@ impl Tally {
         self.beyond += other.beyond;
     }
 
-    /// Advice for all counted sections, `failed` in number.
+    /// Advice for all counted sections; `failed` is their number.
     pub(super) fn again(&self, failed: u32) -> Again {
         Again {
             at_most_mps: if self.mended > 0 && 2 * self.mended >= failed { self.least_mps } else { 0.0 },
@@ -114,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn lowest_mending_speed_is_advised_if_speed_mends_half_of_the_sections() {
+    fn lowest_speed_is_advised_if_a_speed_helps_half_of_the_sections() {
         let fast = [section(Cause::TooFast, 0.12), section(Cause::TooFast, 0.1)];
         assert_eq!(again(&fast), Again { at_most_mps: 0.1, is_beyond_speed: false });
         let lost = section(Cause::MissingReturns, 0.0);
@@ -123,7 +127,7 @@ mod tests {
         // In a mode in which no speed meets the target, missing returns are not the cause.
         let coarse = section(Cause::AngularStep, 0.0);
         assert_eq!(again(&[coarse; 3]), Again::default());
-        // One section of twelve is below the naming threshold.
+        // One section of twelve is too few for a remedy to be advised.
         let mut many = [fast[1]; 12];
         many[3] = lost;
         assert_eq!(again(&many), Again { at_most_mps: 0.1, is_beyond_speed: false });

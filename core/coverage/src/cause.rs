@@ -14,9 +14,9 @@ pub enum Cause {
     AngularStep,
     /// The wall was farther than the heads' range setting.
     OutOfRange,
-    /// The vehicle was off-centre, or turned so that its beams swung along the tunnel.
+    /// The vehicle was off-centre, or it turned and its beams swung along the tunnel.
     OffAxis,
-    /// The heads' passes were unevenly spread. As scheduled they would have met the target.
+    /// The heads' passes were unevenly spread; scheduled passes would have met the target.
     Phase,
     /// The hole extends beyond the stretch that all live heads have swept.
     NotPassed,
@@ -30,13 +30,14 @@ pub enum Cause {
     MissingReturns,
     /// The vehicle occluded the beams.
     Occluded,
-    /// None of these explains the hole.
+    /// No cause explains the hole.
     Unknown,
 }
 
 impl Cause {
-    /// All causes. The causes that the pilot can change come first: of two that explain a hole equally well,
-    /// the first is named.
+    /// All causes, with the causes that the pilot can change first.
+    ///
+    /// If two causes explain a hole equally well, the first in this order is named.
     pub const ALL: [Self; 12] = [
         Self::TooFast,
         Self::AngularStep,
@@ -70,7 +71,7 @@ impl Cause {
         }
     }
 
-    /// Cause of a ping lost for this reason.
+    /// Cause of a ping without a sample, for this reason.
     pub fn of_loss(loss: Loss) -> Self {
         match loss {
             Loss::Missing => Self::MissingReturns,

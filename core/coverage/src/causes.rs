@@ -32,7 +32,7 @@ impl Causes {
         Self(self.0 & !other.0)
     }
 
-    /// The causes of either set.
+    /// The causes in either set.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cause_set_serialises_as_words_main_cause_first() {
+    fn cause_set_serialises_as_words_with_the_main_cause_first() {
         let set = Causes::of(Cause::Occluded).with(Cause::TooFast);
         assert_eq!(serde_json::to_value(set).unwrap(), serde_json::json!(["too_fast", "occluded"]));
         assert_eq!((set.len(), Causes::from_bits(set.bits())), (2, set));

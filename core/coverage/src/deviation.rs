@@ -8,15 +8,16 @@ use headrace_geometry::tunnel::{Profile, Yz};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Deviation {
     samples: u32,
-    /// Samples that deviate by more than the contradiction limit.
+    /// Number of samples that deviate by more than the contradiction limit.
     contradicting: u32,
     sum_m: f64,
     /// Largest inward deviation, m; never above zero.
     inmost_m: f64,
     /// Largest outward deviation, m; never below zero.
     outmost_m: f64,
-    /// Area swept from the reference point between neighbouring samples of a sweep, and the design's area
-    /// there, m2.
+    /// Area swept from the reference point between neighbouring samples, and the design's area, m2.
+    ///
+    /// Both areas cover the same angles of the sweeps.
     swept_m2: f64,
     design_m2: f64,
 }
@@ -24,8 +25,8 @@ pub struct Deviation {
 impl Deviation {
     /// Adds a sample at `point` with arc length `arc_m`, and returns its outward deviation, m.
     ///
-    /// `before` is the same head's previous sample, one step earlier, with its arc length. The deviation is
-    /// measured along the ray from the profile's reference point, as arc length is.
+    /// `before` is the previous sample of the same head, one step earlier, with its arc length. Deviation and arc
+    /// length are both measured along the ray from the profile's reference point.
     pub fn add(
         &mut self,
         profile: &Profile,
@@ -58,14 +59,14 @@ impl Deviation {
         (self.samples > 0).then_some([self.inmost_m, self.outmost_m])
     }
 
-    /// Ratio of the swept cross-section area to the design's; `None` without sweeps.
+    /// Ratio of the swept cross-section area to the design's area; `None` without sweeps.
     pub fn area_ratio(&self) -> Option<f64> {
         (self.design_m2 > 0.0).then(|| self.swept_m2 / self.design_m2)
     }
 
-    /// Whether most samples, and so their median, exceed the contradiction limit.
+    /// Whether most samples exceed the contradiction limit, and thus their median does.
     ///
-    /// Either the profile or the position is wrong then.
+    /// In that case, either the profile or the position is wrong.
     pub fn contradicts(&self) -> bool {
         2 * self.contradicting > self.samples
     }
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn wider_circle_deviates_equally_all_round() {
+    fn wider_circle_has_an_equal_deviation_all_round() {
         let deviation = turned(3.2, 400);
         assert!((deviation.mean_m().unwrap() - 0.2).abs() < 1e-9);
         let [inmost_m, outmost_m] = deviation.extremes_m().unwrap();
@@ -121,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn profile_contradicts_if_most_samples_exceed_the_limit() {
+    fn section_contradicts_the_profile_if_most_samples_exceed_the_limit() {
         assert!(turned(3.6, 100).contradicts() && turned(2.4, 100).contradicts());
         let mut rock = turned(3.0, 100);
         let profile = shapes::circle(3.0).unwrap();

@@ -1,8 +1,8 @@
 //! Explains a fail by the smallest set of factors without which the hole would have met the target.
 //!
-//! Each factor that was present is removed from the measurements by geometry. Either the samples missing
-//! because of it are put back, or the wall is compressed by the amount that passes or steps would have been
-//! closer together. `docs/why/coverage.md` states the order of the factors and its reasons.
+//! The geometry shows how the hole would be without a factor. If samples are missing because of the factor, they are
+//! put back. Otherwise the wall is compressed by the ratio by which passes or steps would have been closer together.
+//! `docs/why/coverage.md` states the order of the factors and the reasons for it.
 
 mod case;
 mod driven;
@@ -25,23 +25,29 @@ use trial::Trial;
 pub use case::Case;
 use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 
-/// Ratio of T as driven to the target above which speed counts as a factor even at the planned speed. T is an
-/// upper bound of D.
-const WELL_OVER: f64 = 1.2;
-/// Ratio of the speed to the planned one above which the plan was not kept.
-const OVER_PLAN: f64 = 1.15;
-/// Replaces both ratios without a position: the speed is then known from the inertial unit alone.
-const OVER_LOST: f64 = 1.4;
-/// Ratio of the speed to the fitting one above which speed counts: just over the speed's measurement error.
+/// Ratio of T as driven to the target above which speed counts as a factor, even at the planned speed.
 ///
-/// The planned speed replaces the fitting one if larger.
+/// T is an upper bound of D.
+const WELL_OVER: f64 = 1.2;
+/// Ratio of the speed to the planned speed above which the vehicle did not follow the plan.
+const OVER_PLAN: f64 = 1.15;
+/// Ratio that replaces `WELL_OVER` and `OVER_PLAN` without a position.
+///
+/// The speed is then known from the inertial unit alone.
+const OVER_LOST: f64 = 1.4;
+/// Ratio of the speed to the largest speed that fits above which speed counts as a factor.
+///
+/// The ratio is just above the measurement error of the speed. The planned speed replaces the largest speed that fits
+/// if it is higher.
 const OVER_ALL: f64 = 1.03;
-/// Swing counts if the distance between passes without it is below this share. Even a steady vehicle sways.
+/// Swing counts as a factor if the distance between passes without swing is below this share.
+///
+/// Even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
-/// Ratio of the angular step, seen from the centre, to the target above which the step counts.
+/// Ratio of the angular step from the centre to the target above which the step counts as a factor.
 const COARSE: f64 = 0.75;
 
-/// Determines the causes of a section's hole from the sections within T of it.
+/// Determines the causes of a section's hole from the sections within T of this section.
 ///
 /// Allocates: never.
 pub fn explain<'a>(
@@ -63,7 +69,7 @@ pub fn explain<'a>(
     let is_lossy = causes.has(Cause::MissingReturns);
     let here =
         if is_lossy { sampled.passes_needed(iter::once(LossRate::independent(missing_share))) } else { 1.0 };
-    // Combined with other causes, losses need to be only as wide as the target.
+    // If there are other causes, too, losses need to explain a hole only as wide as the target.
     let times = if causes.len() > 1 { 1.0 } else { WIDEST };
     let hole_m = case.hole.diameter_m.min(times * case.target_m);
     let is_by_chance = !is_lossy || sampled.is_by_chance(hole_m, drive.along_m(), drive.lost);
@@ -89,13 +95,13 @@ pub fn explain<'a>(
     }
 }
 
-/// Factors that were present.
+/// Factors that were present at the section.
 fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let Case { hole, bounds_m: (from_m, to_m), target_m, .. } = *case;
     let around_m = f64::midpoint(hole.diameter_m.min(WIDEST * target_m), target_m);
     let lacking = case.lacks.between(from_m - around_m, to_m + around_m);
     let near = |lack: &&MissingSample| {
-        // A hole all round the wall takes everything that is missing round the wall.
+        // For a hole all round the wall, missing samples all round the wall count.
         let off_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m).abs();
         off_m < hole.diameter_m + target_m
     };
@@ -115,7 +121,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
-    // Without a position the speed is less certain.
+    // Without a position, the measured speed is less certain.
     let well_over = if is_lost { OVER_LOST } else { WELL_OVER };
     let over_planned = if is_lost { OVER_LOST } else { OVER_PLAN };
     let is_over_all = !is_lost
@@ -126,7 +132,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(over > well_over || is_over_plan || is_over_all, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
     let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
-    // At another speed, heads apart along the hull may happen to pass evenly.
+    // At a speed above the planned one, heads apart along the hull may happen to pass evenly.
     let is_fast = drive.speed_mps > OVER_PLAN * drive.planned_mps;
     add(is_slow || is_uneven || is_fast && drive.all_gap_s < HELPS * drive.healthy_at_plan_s, Cause::Phase);
     let steady = Drive { swing_m: 0.0, ..*drive };

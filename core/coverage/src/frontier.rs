@@ -1,5 +1,6 @@
-//! Frontier: the stretch where samples may still land. It decides when a section is open and when it is
-//! judged.
+//! Frontier: the stretch where samples may still land.
+//!
+//! The frontier decides when a section is open and when it is judged.
 
 use core::ops::Range;
 
@@ -9,7 +10,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::SILENT_AFTER;
 
-/// Stretch of tunnel on which a head currently lands samples.
+/// Stretch of tunnel in which a head's samples currently land.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reach {
     /// Least chainage, m.
@@ -18,25 +19,27 @@ pub struct Reach {
     pub to_m: f64,
 }
 
-/// Reach of one head: its current stretch, and all chainages swept so far.
+/// Reach of one head: its current stretch, and the stretch of all its samples so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
     /// Receive time of the head's last ping, with or without a fix; `None` before the first.
     heard: Option<MonoNs>,
-    /// Reach at its last ping with a fix. For a silent head, its reach at the last update with a fix.
+    /// Reach at the head's last ping with a fix.
+    ///
+    /// For a silent head, this is the reach at the last update with a fix.
     latest: Reach,
-    /// Chainages that its reach has covered; `None` before the first ping with a fix.
+    /// Chainages that the head's reach has covered; `None` before the first ping with a fix.
     swept: Option<Reach>,
 }
 
 impl HeadReach {
-    /// Reach after a ping with a fix at `now`; `before` is the reach before that ping.
+    /// Creates the reach after a ping with a fix at `now`; `before` is the reach before this ping.
     pub fn after(before: Option<Self>, now: MonoNs, reach: Reach) -> Self {
         let swept = before.and_then(|before| before.swept).map_or(reach, |swept| swept.with(reach));
         Self { heard: Some(now), latest: reach, swept: Some(swept) }
     }
 
-    /// Reach of a silent head that would be at `reach` if it pinged.
+    /// Creates the reach of a silent head that would be at `reach` if it pinged.
     pub fn silent_at(before: Option<Self>, reach: Reach) -> Self {
         before.map_or(Self { heard: None, latest: reach, swept: None }, |before| Self {
             latest: reach,
@@ -44,12 +47,14 @@ impl HeadReach {
         })
     }
 
-    /// Records a ping without a fix: the head is alive, and its reach stays as it was at the last fix.
+    /// Records a ping without a fix.
+    ///
+    /// The head is alive, and its reach is unchanged since the last fix.
     pub fn heard(&mut self, now: MonoNs) {
         self.heard = Some(now);
     }
 
-    /// Reach last known.
+    /// Returns the last known reach.
     pub fn latest(&self) -> Reach {
         self.latest
     }
@@ -65,16 +70,18 @@ fn is_within_silence(since: MonoNs, now: MonoNs) -> bool {
 
 /// Tracks the reach of all heads along the tunnel, and the coverage extent.
 ///
-/// The caller stores each head's reach and passes it in.
+/// The caller stores the reach of each head and passes it to the functions.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Frontier {
-    /// Chainages that any head's reach has covered.
+    /// Chainages that the reach of any head has covered.
     swept: Option<Reach>,
-    /// Coverage extent: chainages of the vehicle and its heads, pinging or not, and those swept.
-    way: Option<Reach>,
-    /// Stretch that the whole reach of all heads, pinging or not, has passed.
+    /// Coverage extent: chainages where the vehicle and its heads have been, and chainages with samples.
     ///
-    /// It is empty (`from_m` beyond `to_m`) until then.
+    /// Heads count whether they ping or not.
+    way: Option<Reach>,
+    /// Stretch that the whole combined reach of all heads, pinging or not, has passed.
+    ///
+    /// The stretch is empty (`from_m` above `to_m`) until the whole reach has passed a place.
     through: Option<Reach>,
     /// Index range of the sections within the reach of the awaited heads plus a margin.
     zone: Option<Range<i64>>,
@@ -82,8 +89,9 @@ pub struct Frontier {
     zone_moved: Option<MonoNs>,
     /// Time of the last ping of any head.
     heard: Option<MonoNs>,
-    /// Time of the first ping, and of each ping that ended a silence of all heads. Before it, time of the
-    /// first update.
+    /// Time of the first ping, and of each ping that ended a silence of all heads.
+    ///
+    /// Before the first ping, this is the time of the first update.
     woken: Option<MonoNs>,
     course: Option<Course>,
     /// Number of course reversals.
@@ -93,20 +101,20 @@ pub struct Frontier {
 /// Direction of travel along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Course {
-    /// Farthest chainage on this course, m: the centre of the heads' combined reach.
+    /// Farthest centre of the heads' combined reach on this course, as chainage, m.
     farthest_m: f64,
     astern: bool,
-    /// Number of heads in that reach.
+    /// Number of heads in the combined reach.
     heads: usize,
 }
 
-/// Hysteresis for a reversal of the course, m: yaw and tether slack cause smaller ones.
+/// Hysteresis for a reversal of the course, m: yaw and tether slack cause smaller reversals.
 const TURNED_M: f64 = 0.25;
 
 impl Course {
-    /// Updates the course with the centre of the current reach of `heads` heads.
+    /// Updates the course with the centre of the combined reach of `heads` heads.
     ///
-    /// A change in the number of heads moves the centre without any movement of the vehicle.
+    /// If the number of heads changes, the centre moves without any movement of the vehicle.
     fn to(self, middle_m: f64, heads: usize) -> Self {
         if heads != self.heads {
             return Self { farthest_m: middle_m, heads, ..self };
@@ -125,7 +133,7 @@ impl Course {
 pub struct Outlook {
     /// Time of the outlook.
     pub at: MonoNs,
-    /// Coverage extent: chainages at which the vehicle and its heads, pinging or not, have been.
+    /// Coverage extent: chainages where the vehicle and its heads, pinging or not, have been.
     pub way: Option<Reach>,
     /// Stretch covered by every awaited head that has pinged; `None` if empty.
     pub swept_by_all: Option<Reach>,
@@ -133,36 +141,38 @@ pub struct Outlook {
     pub none_alive: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Stretch behind the place where the vehicle began or turned back: not all heads have been there, nor
-    /// will be.
+    /// Stretch behind the place where the vehicle began or turned back.
+    ///
+    /// Not all heads have been in this stretch, and on the present course they will not be.
     pub not_passed: Option<Reach>,
-    /// Stretch that all heads, pinging or not, have passed; `None` until they have.
+    /// Stretch that all heads, pinging or not, have passed; `None` before.
     pub through: Option<Reach>,
-    /// Zone of sections in reach, once unchanged for longer than [`SILENT_AFTER`]: the vehicle is nearly
-    /// stationary.
+    /// Zone of sections in reach if it has been unchanged for longer than [`SILENT_AFTER`].
+    ///
+    /// The vehicle is then nearly stationary.
     pub still_zone: Option<Range<i64>>,
 }
 
 /// Change of the frontier by one ping or update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections newly behind the zone.
+    /// Sections that are newly behind the zone.
     pub left_behind: Range<i64>,
-    /// Sections newly ahead of the zone: the vehicle is backing up.
+    /// Sections that are newly ahead of the zone, because the vehicle moves backwards.
     pub left_ahead: Range<i64>,
-    /// The coverage extent has grown by at least a section, perhaps outside the zone.
+    /// Whether the coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
 }
 
 impl Frontier {
-    /// Chainages that have been within reach of any head.
+    /// Returns the chainages that have been within reach of any head.
     pub fn swept(&self) -> Option<Reach> {
         self.swept
     }
 
-    /// Coverage extent: chainages at which the vehicle and its heads, pinging or not, have been.
+    /// Returns the coverage extent: chainages where the vehicle and its heads, pinging or not, have been.
     pub fn way(&self) -> Option<Reach> {
         self.way
     }
@@ -172,7 +182,7 @@ impl Frontier {
         self.turns
     }
 
-    /// The outlook at `at`, given all heads' reaches.
+    /// Returns the outlook at `at`; `heads` are the reaches of all heads.
     pub fn outlook(&self, heads: impl Iterator<Item = HeadReach> + Clone, at: MonoNs) -> Outlook {
         let common = |a: Reach, b: Reach| Reach { from_m: a.from_m.max(b.from_m), to_m: a.to_m.min(b.to_m) };
         let swept = self.awaited(heads.clone(), at).filter_map(|head| head.swept);
@@ -188,13 +198,15 @@ impl Frontier {
         }
     }
 
-    /// `None` within [`SILENT_AFTER`] of the first ping: it isn't known yet which heads are alive.
+    /// Returns the zone if the vehicle is nearly stationary.
+    ///
+    /// `None` within [`SILENT_AFTER`] of the first ping: the live heads are not known yet.
     fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
         let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT_AFTER.0);
         self.zone.clone().filter(|_| over(self.woken) && over(self.zone_moved))
     }
 
-    /// Whether a head has been silent so long that it isn't waited for while others ping.
+    /// Whether a head has been silent for so long that sections do not wait for it while others ping.
     pub fn is_silent(&self, head: Option<&HeadReach>, now: MonoNs) -> bool {
         match head.and_then(|head| head.heard) {
             Some(heard) => !is_within_silence(heard, now),
@@ -202,16 +214,16 @@ impl Frontier {
         }
     }
 
-    /// Whether it isn't known yet which heads are alive.
+    /// Whether the live heads are not known yet.
     ///
-    /// True for [`SILENT_AFTER`] after the first ping, and after one that ended a silence of all heads.
+    /// True for [`SILENT_AFTER`] after the first ping, and after a ping that ended a silence of all heads.
     fn is_waking(&self, now: MonoNs) -> bool {
         self.woken.is_none_or(|woken| is_within_silence(woken, now))
     }
 
-    /// Heads whose samples decide what may still come: the live ones.
+    /// Returns the awaited heads: the live heads, whose samples may still land.
     ///
-    /// All heads count if none is alive, or while it isn't known yet which are.
+    /// All heads are awaited if none is alive, or while the live heads are not known yet.
     fn awaited(
         &self,
         heads: impl Iterator<Item = HeadReach> + Clone,
@@ -221,13 +233,14 @@ impl Frontier {
         heads.filter(move |head| all || head.is_alive(now))
     }
 
-    /// Combined reach of the awaited heads.
+    /// Returns the combined reach of the awaited heads.
     fn reach(&self, heads: impl Iterator<Item = HeadReach> + Clone, now: MonoNs) -> Option<Reach> {
         self.awaited(heads, now).map(|head| head.latest).reduce(Reach::with)
     }
 
-    /// Stretch where samples may still land without the vehicle turning back: the current reach and
-    /// everything ahead.
+    /// Returns the stretch where samples may still land without the vehicle turning back.
+    ///
+    /// The stretch contains the current reach and everything ahead.
     fn to_come(&self, heads: impl Iterator<Item = HeadReach> + Clone, now: MonoNs) -> Option<Reach> {
         let reach = self.reach(heads, now)?;
         Some(match self.course {
@@ -243,7 +256,7 @@ impl Frontier {
             Some(Reach { from_m: through.from_m.min(all.to_m), to_m: through.to_m.max(all.from_m) });
     }
 
-    /// Stretch that all heads, pinging or not, have passed; `None` until they have.
+    /// Returns the stretch that all heads, pinging or not, have passed; `None` before.
     pub fn through(&self) -> Option<Reach> {
         self.through.filter(|through| through.from_m <= through.to_m)
     }
@@ -266,7 +279,7 @@ impl Frontier {
 
     /// Updates the frontier for a ping at `now` with reach `pinged`.
     ///
-    /// `heads` are the reaches of all heads, including this one. A section leaves the zone once it is farther
+    /// `heads` are the reaches of all heads, including the pinging one. A section leaves the zone once it is farther
     /// than `margin_m` from the reach of every awaited head.
     pub fn advance(
         &mut self,
@@ -282,10 +295,10 @@ impl Frontier {
         self.move_zone(heads, now, section_m, margin_m)
     }
 
-    /// Updates the frontier at `now` when vehicle and heads, pinging or not, span `span`.
+    /// Updates the frontier at `now`; vehicle and heads, pinging or not, are within `span`.
     ///
-    /// `heads` are the reaches of all heads, with silent ones where they would be. While a head is alive,
-    /// only pings move the zone.
+    /// `heads` are the reaches of all heads; silent heads are at the places where they would ping. While a head is
+    /// alive, only pings move the zone.
     pub fn beat(
         &mut self,
         span: Reach,
@@ -362,14 +375,16 @@ impl Reach {
         f64::midpoint(self.from_m, self.to_m)
     }
 
-    /// Smallest stretch that covers both.
+    /// Returns the smallest stretch that covers both stretches.
     #[must_use]
     pub fn with(self, other: Self) -> Self {
         Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
     }
 }
 
-/// Distance of a chainage from the stretch where samples may still land, m; infinite if there is none.
+/// Distance of a chainage from the stretch where samples may still land, m.
+///
+/// Infinite if there is no such stretch.
 pub fn clear_of(to_come: Option<Reach>, x_m: f64) -> f64 {
     to_come.map_or(f64::INFINITY, |reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0))
 }
@@ -399,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn section_is_left_when_the_last_head_is_a_margin_past_it() {
+    fn section_leaves_the_zone_when_the_last_head_is_a_margin_past_it() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
@@ -410,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn going_back_leaves_sections_ahead() {
+    fn sections_ahead_leave_the_zone_when_the_vehicle_moves_backwards() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 2.0, 0.25, 0.25);
         let moved = frontier.advance(0, MonoNs(1), 1.7, 0.25, 0.25);
@@ -433,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_head_is_not_awaited() {
+    fn silent_head_does_not_hold_back_the_zone() {
         let mut frontier = Fixture::default();
         frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);
@@ -443,8 +458,9 @@ mod tests {
     }
 
     impl Fixture {
-        /// An update at `now`, seconds, with the heads, alive or not, half a metre before and behind the
-        /// vehicle.
+        /// Updates the frontier at `now_s`, seconds.
+        ///
+        /// The heads, alive or not, are half a metre before and behind the vehicle.
         fn beat(&mut self, now_s: u64, x_m: f64) -> Moved {
             let now = MonoNs(now_s * 1_000_000_000);
             let places = [x_m + 0.5, x_m - 0.5].map(|x_m| Reach { from_m: x_m, to_m: x_m });
@@ -484,12 +500,12 @@ mod tests {
     }
 
     #[test]
-    fn sections_are_left_with_the_vehicle_if_no_head_is_alive() {
+    fn vehicle_moves_the_zone_if_no_head_is_alive() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
         assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "their silence isn't known yet");
-        // The rear head would be at 6: [5.5, 5.75) is behind it by a quarter of a metre.
+        // The rear head would be at 6 m, a quarter of a metre beyond [5.5, 5.75).
         assert_eq!(frontier.beat(3, 6.5).left_behind, 9..23);
         let to_come = frontier.to_come(MonoNs(3_000_000_000));
         assert_eq!(to_come, Some(Reach { from_m: 6.0, to_m: f64::INFINITY }));
@@ -497,7 +513,7 @@ mod tests {
     }
 
     #[test]
-    fn passed_stretch_spans_foremost_start_to_rearmost_position() {
+    fn passed_stretch_spans_from_the_foremost_start_to_the_rearmost_position() {
         let mut frontier = Frontier::default();
         let at = |x_m: f64| Reach { from_m: x_m - 0.5, to_m: x_m + 0.5 };
         assert_eq!((frontier.through(), frontier.not_passed()), (None, None));
@@ -515,7 +531,7 @@ mod tests {
     }
 
     #[test]
-    fn returning_heads_are_all_awaited() {
+    fn all_heads_are_awaited_after_a_silence_of_all() {
         let mut frontier = Fixture::default();
         frontier.beat(0, 3.0);
         frontier.beat(5, 4.0);

@@ -31,29 +31,33 @@ pub use hypothetical::WallChanges;
 
 /// Maximum search radius, m: wall farther than this from any sample counts as not passed.
 pub const FARTHEST_M: f64 = 12.0;
-/// Half diagonal below which a tile isn't halved, m: its bound is within 2e-10 m of the exact value.
+/// Half diagonal below which a tile isn't halved, m.
+///
+/// The bound of such a tile is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
 /// Upper limit of the rounding error of a distance, m.
 const ROUNDING_M: f64 = 1e-9;
 /// Owner of a tile without a known sample.
 const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
-/// Rounding tolerance for accepting a corner's bound as proven, m.
+/// Rounding tolerance with which a corner's bound counts as proven, m.
 const PROVEN_M: f64 = 1e-11;
 
 /// The largest empty circle with its centre in a section.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Hole {
-    /// Diameter of the largest empty circle found among the samples kept, m.
+    /// Diameter of the largest empty circle found among the stored samples, m.
     pub diameter_m: f64,
     /// Lower bound of D, m: `diameter_m` less the possible effect of thinned and moved samples.
     pub least_m: f64,
-    /// Upper bound of D, m; infinite when not `bounded`.
+    /// Upper bound of D, m; infinite if the hole is not `bounded`.
     pub most_m: f64,
-    /// Chainage of its centre, m.
+    /// Chainage of the centre, m.
     pub x_m: f64,
-    /// Arc length of its centre, m.
+    /// Arc length of the centre, m.
     pub arc_m: f64,
-    /// Whether there are samples around it. If not, D is at least `diameter_m`.
+    /// Whether there are samples around the hole.
+    ///
+    /// If there are none, D is at least `diameter_m`.
     pub bounded: bool,
 }
 
@@ -69,13 +73,14 @@ impl Hole {
 
 #[derive(Debug, Clone, Copy)]
 struct Tile {
-    /// Centre, from the start of the section, m.
+    /// Centre of the tile, from the start of the section, m.
     x_m: f64,
     arc_m: f64,
     half_x_m: f64,
     half_arc_m: f64,
-    /// Sample nearest to the centre, relative to it, m. In searches for any circle: a nearby sample, from the
-    /// start of the section.
+    /// Sample nearest to the tile's centre, relative to the centre, m.
+    ///
+    /// In searches for any circle, this is a nearby sample, from the start of the section.
     owner: (f64, f64),
     /// Upper bound of f in the tile, m.
     bound_m: f64,
@@ -99,16 +104,16 @@ struct Beyond {
 
 /// Search result near the centre of a tile.
 enum Near {
-    /// A sample so near that every point of the tile has it within the radius.
+    /// A sample is so near that it is within the radius of every point of the tile.
     Settled,
-    /// The nearest sample, or one equally near.
+    /// The nearest sample, or an equally near one.
     Sample(Nearest),
     /// No sample within reach.
     Nothing,
 }
 
 impl Near {
-    /// The sample and its distance, m; `None` if the tile is settled.
+    /// Returns the sample and its distance, m; `None` if the tile is settled.
     fn unsettled(self) -> Option<(Option<Nearest>, f64)> {
         match self {
             Self::Settled => None,
@@ -124,7 +129,7 @@ impl Tile {
         math::sqrt(self.half_x_m * self.half_x_m + self.half_arc_m * self.half_arc_m)
     }
 
-    /// The tile cut across its longer side.
+    /// Halves of the tile, cut across its longer side.
     fn halves(&self) -> [Self; 2] {
         let along_x = self.half_x_m > self.half_arc_m;
         [-0.5, 0.5].map(|side| {
@@ -137,12 +142,12 @@ impl Tile {
         })
     }
 
-    /// Searches near the tile's centre.
+    /// Searches for a sample near the tile's centre.
     ///
-    /// If the owner (chainage and arc length) is near enough to settle the tile, there is no search.
-    /// Otherwise any sample near enough will do.
+    /// If the owner (chainage and arc length) is near enough to settle the tile, the function does not search.
+    /// Otherwise, it returns any sample that is near enough, or the nearest one.
     fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
-        // The margins exceed the rounding of the distances.
+        // The margins are larger than the rounding errors of the distances.
         let enough_m = radius_m - self.half_m() - ROUNDING_M;
         let (dx, darc) = (self.owner.0 - self.x_m, self.owner.1 - self.arc_m);
         let owner_m = math::sqrt(dx * dx + darc * darc);
@@ -153,7 +158,7 @@ impl Tile {
         window.near_enough(self.x_m, self.arc_m, within_m, enough_m).map_or(Near::Nothing, Near::Sample)
     }
 
-    /// Halves of a tile, owned by its nearest sample if there is one within reach.
+    /// Returns the halves of a tile, owned by the nearest sample if one is within reach.
     fn halves_of(mut self, nearest: Option<&Nearest>, perimeter_m: f64) -> [Self; 2] {
         if let Some(found) = nearest {
             self.owner = (found.x_m, found.arc_m + found.turns * perimeter_m);
@@ -161,7 +166,9 @@ impl Tile {
         self.halves()
     }
 
-    /// Sample position relative to the centre: bit-identical from whichever point the sample was found.
+    /// Returns the sample's position relative to the tile's centre.
+    ///
+    /// The position is bit-identical, whatever the point from which the search found the sample.
     fn relative(&self, found: &Nearest, perimeter_m: f64) -> (f64, f64) {
         (found.x_m - self.x_m, (found.arc_m - self.arc_m) + found.turns * perimeter_m)
     }
@@ -182,11 +189,11 @@ fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
     })
 }
 
-/// Finds the largest hole of a stretch of wall. It reuses its working memory between searches.
+/// Finds the largest hole of a stretch of wall; searches share their working memory.
 #[derive(Debug)]
 pub struct HoleFinder {
     tolerance_m: f64,
-    /// Radius of the last hole, m: first guess for the next search.
+    /// Radius of the last hole, m: the first guess for the next search.
     last_m: f64,
     window: Window,
     tiles: Vec<Tile>,
@@ -202,7 +209,7 @@ impl Default for HoleFinder {
 stateful!(HoleFinder { state: last_m; fixed: tolerance_m, window, tiles, division; });
 
 impl HoleFinder {
-    /// Search that finds D to within a tolerance, m; zero is exact.
+    /// Creates a search that finds D to within a tolerance, m; zero means an exact search.
     ///
     /// Allocates: at startup, all that it will ever use.
     pub fn new(tolerance_m: f64) -> Self {
@@ -215,16 +222,16 @@ impl HoleFinder {
         }
     }
 
-    /// The largest hole whose centre has a chainage in [`from_m`, `to_m`].
+    /// Returns the largest hole whose centre has a chainage in [`from_m`, `to_m`].
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest(&mut self, store: &SampleStore, from_m: f64, to_m: f64) -> Hole {
         self.largest_since(store, from_m, to_m, 0)
     }
 
-    /// Largest hole among the samples of visits from `first_visit` on.
+    /// Returns the largest hole among the samples of visits from `first_visit` on.
     ///
-    /// Its `least_m` is no bound: full cells leave out samples near those of earlier visits.
+    /// The `least_m` of the hole is no bound: full cells leave out samples near those of earlier visits.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest_since(&mut self, store: &SampleStore, from_m: f64, to_m: f64, first_visit: u32) -> Hole {
@@ -244,13 +251,13 @@ impl HoleFinder {
         }
     }
 
-    /// The point farthest from all samples.
+    /// Returns the point farthest from all samples.
     ///
     /// Errors: a point has no sample within `reach_m`.
     fn search(&mut self, length_m: f64, reach_m: f64) -> Result<Best, Beyond> {
         let mut best = Best { distance_m: 0.0, x_m: 0.0, arc_m: 0.0, dropped_m: 0.0 };
         self.tiles.clear();
-        // A good first guess saves most of the work: every tile's centre is evaluated before any tile is divided, and
+        // A good first guess saves most of the work. All tiles' centres are evaluated before any tile is divided, and
         // the tile with the largest bound is divided first.
         let mut within_m = reach_m;
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
@@ -272,8 +279,9 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile until its bound can't exceed the best point, which may lie in it. False if the tile
-    /// must be halved first.
+    /// Divides a tile until its bound can't exceed the best point, which may lie in the tile.
+    ///
+    /// Returns false if the tile must be halved first.
     fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {
         let enough = |best: &Best| best.distance_m + self.tolerance_m / 2.0;
         if tile.bound_m <= enough(best) || tile.half_m() < NO_FINER_M {
@@ -293,7 +301,7 @@ impl HoleFinder {
                 if bound_m > reach_m {
                     return Err(Beyond { x_m, arc_m });
                 }
-                // The share's owner is the nearest sample, except for rounding.
+                // The owner of the share is the nearest sample, except for rounding.
                 best.take(bound_m, x_m, arc_m);
                 return Ok(true);
             };

@@ -13,8 +13,9 @@ pub struct Metres {
     pub cannot_say_m: f64,
     /// Metres that further driving may still fill.
     pub open_m: f64,
-    /// Metres at the ends of the coverage extent that not all heads have passed. Further driving won't change
-    /// them.
+    /// Metres at the ends of the coverage extent that not all heads have passed.
+    ///
+    /// Further driving on the present course does not change them.
     pub not_inspected_m: f64,
 }
 

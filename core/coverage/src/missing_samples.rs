@@ -1,7 +1,7 @@
-//! Missing samples: places on the wall where a ping would have left a sample, and the causes of each loss.
+//! Missing samples: places where a ping would have left a sample, and the causes of each loss.
 //!
-//! If the samples missing for a factor are put back, the hole becomes what it would have been without that
-//! factor. Only the latest are kept, because fails are explained soon after the vehicle has left their place.
+//! If the samples missing because of a factor are put back, the hole becomes the hole without this factor. Only the
+//! latest missing samples are kept, because fails are explained soon after the vehicle has left their place.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,26 +9,27 @@ use super::cause::Cause;
 use super::causes::Causes;
 use headrace_geometry::snapshot::stateful;
 
-/// Capacity: five minutes of four heads that get no return at all.
+/// Capacity: the pings of four heads in five minutes without any return.
 const ROOM: usize = 1 << 16;
-/// Missing samples per block with a common extent, so that a search over a few metres skips other blocks.
-/// Divides the capacity.
+/// Number of missing samples per block with a common extent.
+///
+/// A search over a few metres skips the other blocks. The number divides the capacity.
 const BLOCK: usize = 1 << 8;
 
 /// A missing sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MissingSample {
-    /// Chainage at which it would lie, m.
+    /// Chainage at which the sample would lie, m.
     pub x_m: f64,
-    /// Arc length, m.
+    /// Arc length at which the sample would lie, m.
     pub arc_m: f64,
-    /// Number of its head.
+    /// Number of the head that would have made the sample.
     pub head: u8,
-    /// All causes that would have to be absent for the sample to exist.
+    /// All causes without which the sample would exist; all of them would have to be absent.
     pub why: Causes,
 }
 
-/// Latest missing samples.
+/// List of the latest missing samples.
 #[derive(Debug)]
 pub struct MissingSamples {
     ring: Vec<MissingSample>,
@@ -48,7 +49,7 @@ impl Default for MissingSamples {
 }
 
 impl MissingSamples {
-    /// Adds a missing sample. It replaces the oldest if there is no room.
+    /// Adds a missing sample, which replaces the oldest one if there is no room.
     ///
     /// Allocates: never.
     pub fn add(&mut self, lack: MissingSample) {
@@ -62,8 +63,9 @@ impl MissingSamples {
         self.extend(at, lack.x_m);
     }
 
-    /// Extends a block's extent by an entry at this position of the ring. A block full of new entries gets
-    /// the extent of these alone.
+    /// Extends a block's extent by the entry at this position of the ring.
+    ///
+    /// Once all entries of a block are new, the extent is that of these entries alone.
     fn extend(&mut self, at: usize, x_m: f64) {
         let block = at / BLOCK;
         let wider_m = |[from_m, to_m]: [f64; 2], x_m: f64| [from_m.min(x_m), to_m.max(x_m)];
@@ -95,7 +97,7 @@ impl MissingSamples {
         })
     }
 
-    /// Missing samples between two chainages, in no particular order.
+    /// Returns the missing samples between two chainages, in no particular order.
     pub fn between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = &MissingSample> {
         let meets = move |extent_m: &[f64; 2]| extent_m[0] <= to_m && extent_m[1] >= from_m;
         let blocks =
@@ -123,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn latest_samples_of_one_head_change_their_cause() {
+    fn latest_missing_samples_of_one_head_are_reassigned() {
         let mut lacks = MissingSamples::default();
         let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
         for k in 0..ROOM + 100 {
@@ -131,7 +133,7 @@ mod tests {
             lacks.add(MissingSample { x_m: k as f64, arc_m: 0.0, head, why: Causes::of(why) });
         }
         let last = (ROOM + 99) as f64;
-        // Of ten in a row head 1 has five. The very last is occluded.
+        // Head 1 made five of ten samples in a row. The last one is occluded.
         assert_eq!(lacks.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
         let revised = |lack: &&MissingSample| lack.why == Causes::of(silent);
         let revised: Vec<MissingSample> =
@@ -140,8 +142,9 @@ mod tests {
         assert_eq!(lacks.revise(2, 8, [missing, silent]), None);
     }
 
-    /// Block search finds the same as a full search while the ring fills and is overwritten, on a drive there
-    /// and back.
+    /// A search by blocks finds the same as a full search, while the ring fills and while it is overwritten.
+    ///
+    /// The drive goes there and back.
     #[test]
     fn block_search_finds_every_missing_sample() {
         let mut lacks = MissingSamples::default();

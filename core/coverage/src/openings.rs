@@ -1,5 +1,6 @@
-//! Declared openings of the wall, such as side tunnels and gates. They are excluded from holes and listed in
-//! the report.
+//! Declared openings of the wall, such as side tunnels and gates.
+//!
+//! Openings are excluded from holes and listed in the report.
 
 use super::store::{SampleStore, StoreError, WallSample};
 use headrace_geometry::math;
@@ -10,38 +11,42 @@ use headrace_geometry::tunnel::Profile;
 pub struct Opening {
     /// Display name.
     pub name: String,
-    /// Chainage of its beginning, m.
+    /// Chainage of the opening's beginning, m.
     pub from_m: f64,
-    /// Chainage of its end, m.
+    /// Chainage of the opening's end, m.
     pub to_m: f64,
-    /// Arc length of its beginning, and its length along the perimeter, m; `None` for the whole perimeter.
+    /// Arc length of the opening's beginning, and length along the perimeter, m.
+    ///
+    /// `None` for the whole perimeter.
     pub arc_m: Option<(f64, f64)>,
 }
 
-/// Maximum spacing of the samples that fill an opening, m. A tenth of the target replaces it if smaller.
+/// Maximum spacing of the samples that fill an opening, m.
+///
+/// The spacing is at most a tenth of the target.
 const SPACING_M: f64 = 0.05;
 
 impl Opening {
-    /// Its extent along the perimeter, m.
+    /// Returns the opening's extent along the perimeter: arc length of its beginning and its length, m.
     fn arc(&self, perimeter_m: f64) -> (f64, f64) {
         self.arc_m.map_or((0.0, perimeter_m), |(from_m, length_m)| (from_m, length_m.min(perimeter_m)))
     }
 
-    /// Intervals along the tunnel and the perimeter at a spacing.
+    /// Returns the numbers of intervals along the tunnel and the perimeter at a spacing.
     fn counts(&self, perimeter_m: f64, spacing_m: f64) -> (i64, i64) {
         let over = |length_m: f64| (-math::floor_to_i64(-length_m / spacing_m)).max(1);
         (over(self.to_m - self.from_m), over(self.arc(perimeter_m).1))
     }
 
-    /// Number of samples that fill it.
+    /// Returns the number of samples that fill the opening.
     pub fn places(&self, perimeter_m: f64, target_m: f64) -> i64 {
         let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
         (along + 1) * (around + 1)
     }
 
-    /// Fills it with samples, so that no hole extends farther into it than half their spacing.
+    /// Fills the opening with samples, so that a hole extends into it by at most half of their spacing.
     ///
-    /// Errors: the store is full, or the opening lies outside its extent.
+    /// Errors: the store is full, or the opening lies outside the store's extent.
     pub fn fill(&self, store: &mut SampleStore, target_m: f64) -> Result<(), StoreError> {
         let perimeter_m = store.perimeter_m();
         let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
@@ -79,7 +84,7 @@ mod tests {
         Opening { name: "gate".to_owned(), from_m: 4.0, to_m: 6.0, arc_m: Some((17.0, 4.0)) }
     }
 
-    /// A wall sampled every half metre except in the opening.
+    /// A wall with samples every half metre, except in the opening.
     fn store(profile: &Profile, with_opening: bool) -> SampleStore {
         let layout = StoreLayout {
             perimeter_m: profile.perimeter_m(),
@@ -121,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn opening_share_of_a_section_is_its_area_share() {
+    fn opening_share_of_a_section_is_a_share_of_its_area() {
         let profile = shapes::circle(3.0).unwrap();
         let share = |from_m: f64| gate().share_of(from_m, from_m + 0.25, &profile);
         assert!((share(5.0) - 4.0 / profile.perimeter_m()).abs() < 1e-12);
@@ -131,9 +136,9 @@ mod tests {
         assert!((all_round.share_of(5.0, 5.25, &profile) - 1.0).abs() < 1e-12);
     }
 
-    /// 2 m by 4 m: every 5 cm, or every 2 cm if the target is 0.2 m.
+    /// Samples fill 2 m by 4 m every 5 cm, or every 2 cm for a target of 0.2 m.
     #[test]
-    fn opening_fills_as_many_samples_as_counted() {
+    fn number_of_filling_samples_equals_the_predicted_number() {
         let profile = shapes::circle(3.0).unwrap();
         for (target_m, expected) in [(0.8, 41 * 81), (0.2, 101 * 201)] {
             let layout = StoreLayout {

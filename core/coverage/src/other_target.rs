@@ -10,22 +10,22 @@ use super::sections::{Sections, verdict};
 struct Measured {
     hole: Hole,
     sd_m: f64,
-    /// The profile is wrong there, or there is no wall.
+    /// Whether the profile is wrong in this section, or there is no wall.
     doubtful: bool,
 }
 
 impl Measured {
-    /// Figures of a section whose hole has been measured.
+    /// Figures of a section with a measured hole.
     fn of(section: &Section) -> Option<Self> {
         Some(Self { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.doubt().is_some() })
     }
 }
 
 impl Sections {
-    /// Verdicts for another target of all sections whose hole has been measured, by index.
+    /// Returns verdicts for another target of all sections with a measured hole, by index.
     ///
-    /// Counted visits and settled sections stay those of the dive's own target. A replay with the other
-    /// target gives what the dive would have reported.
+    /// The counted visits and the settled sections are still those for the dive's own target. A replay with the other
+    /// target gives the verdicts that the dive would have reported.
     pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
         self.sections_of(outlook.way).filter_map(move |index| {
             Some((index, self.verdict_of(&Measured::of(self.get(index)?)?, target_m, outlook)))
@@ -58,7 +58,7 @@ mod tests {
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
-    /// A pipe with samples every 0.2 m except for 0.6 m from 5 m on.
+    /// A pipe with samples every 0.2 m, except from 5 m to 5.6 m.
     ///
     /// The coverage extent is 3 m to 7 m, judged in sections of a quarter of a metre.
     struct Seen {
@@ -104,10 +104,11 @@ mod tests {
         }
     }
 
-    /// The largest circle from 5 m to 5.6 m measures 0.63 m. Centred within a quarter of a metre of 5 m, it
-    /// measures 0.54 m.
+    /// The largest circle between 5 m and 5.6 m measures 0.63 m.
+    ///
+    /// If the circle's centre is within a quarter of a metre of 5 m, it measures 0.54 m.
     #[test]
-    fn another_target_uses_the_measured_holes() {
+    fn verdicts_for_another_target_use_the_measured_holes() {
         let seen = Seen::new();
         for (target_m, failing) in [(0.5, 20..22), (0.6, 21..22), (0.7, 0..0), (0.2, 12..29)] {
             let verdicts: Vec<_> = seen.sections.verdicts_at(target_m, &seen.outlook).collect();

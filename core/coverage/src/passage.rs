@@ -1,4 +1,4 @@
-//! Ping statistics of the passage through a section: evidence for the cause of a fail.
+//! Ping statistics of the passage through a section, as evidence for the cause of a fail.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ pub struct Passage {
     pub pings: u32,
     /// Pings with a fix.
     pub placed: u32,
-    /// Pings without a return although the wall was within range, or without a fix.
+    /// Pings without a fix, or without a return although the wall was within range.
     pub missing: u32,
     /// Pings without a return where the wall was farther than the range setting.
     pub out_of_range: u32,
@@ -27,15 +27,17 @@ pub struct Passage {
     pub unplaced: u32,
     /// Pings of a stalled head.
     pub standing: u32,
-    /// Heads that went through without a ping.
+    /// Heads that passed through the section without a ping.
     pub silent: HeadSet,
     /// Driving figures at the moment of the largest T.
     pub drive: Drive,
-    /// More pings without a fix were made than are remembered.
+    /// Whether more pings without a fix were made than are stored.
     pub unseen: bool,
-    /// A ping's place was so uncertain against the previous pass that its speed is no evidence.
+    /// Whether a ping's place was too uncertain for its speed to be evidence.
+    ///
+    /// The uncertainty is relative to the previous pass.
     pub adrift: bool,
-    /// Relative error between passes in the newest visit with a ping here.
+    /// Error between passes in the newest visit with a ping in the section.
     pub pass_error: PassError,
 }
 
@@ -48,63 +50,68 @@ pub struct Drive {
     pub planned_mps: f64,
     /// Longest time between two passes of the heads that turned, seconds.
     pub gap_s: f64,
-    /// `gap_s` if these heads were evenly spread.
+    /// Time `gap_s` if these heads were evenly spread, seconds.
     pub even_gap_s: f64,
-    /// `gap_s` if all heads were turning, with none silent or stalled.
+    /// Time `gap_s` if all heads were turning, with none silent or stalled, seconds.
     pub healthy_gap_s: f64,
-    /// `gap_s` if all heads' angles were as scheduled, at this speed.
+    /// Time `gap_s` if all heads' angles were as scheduled, at this speed, seconds.
     pub planned_gap_s: f64,
-    /// `gap_s` if all heads were evenly spread.
+    /// Time `gap_s` if all heads were evenly spread, seconds.
     pub all_gap_s: f64,
-    /// `gap_s` at the planned speed, or at this speed if none is planned.
+    /// Time `gap_s` at the planned speed, or at this speed if none is planned, seconds.
     pub gap_at_plan_s: f64,
-    /// `healthy_gap_s` at the planned speed.
+    /// Time `healthy_gap_s` at the planned speed, seconds.
     pub healthy_at_plan_s: f64,
-    /// `gap_s` at the planned speed for the heads that turn and never stalled, with their angles as
-    /// scheduled.
+    /// Time `gap_s` at the planned speed for the heads that turn and never stalled, seconds.
+    ///
+    /// Their angles are as scheduled.
     pub left_at_plan_s: f64,
     /// Time between two pings, seconds.
     pub ping_period_s: f64,
-    /// Distance that the beams have swung along the tunnel since the neighbouring passes, at their farthest,
-    /// m.
+    /// Largest distance that the beams have swung along the tunnel since the neighbouring passes, m.
     pub swing_m: f64,
-    /// Largest step along the perimeter between two pings from the vehicle's place, by geometry, m.
+    /// Largest step along the perimeter between two pings from the vehicle's position, by geometry, m.
     pub t_y_m: f64,
-    /// Largest step from the tunnel's centre, m.
+    /// Largest step along the perimeter between two pings from the tunnel's centre, m.
     pub middle_t_y_m: f64,
-    /// Largest speed that meets the target from the tunnel's centre with all heads turning as scheduled, m/s.
+    /// Largest speed that meets the target from the tunnel's centre, m/s.
     ///
-    /// It is the planned speed if that meets the target, and zero if no speed does.
+    /// All heads are assumed to turn as scheduled. The value is the planned speed if this speed meets the target, and
+    /// zero if no speed does.
     pub fits_mps: f64,
-    /// Distance along the tunnel between passes that the target leaves room for, m.
+    /// Largest distance between passes along the tunnel with which the target is met, m.
     pub fits_along_m: f64,
-    /// Number of passes needed in place of one, given the lost returns: see [`headrace_sampling::losses`].
+    /// Number of passes that replace a single pass because of lost returns.
+    ///
+    /// See [`headrace_sampling::losses`].
     pub passes_needed: f64,
-    /// Loss rate of the head that loses most returns by chance.
+    /// Loss rate of the head that loses the most returns by chance.
     pub lost: LossRate,
-    /// Heads sweep back and forth in sectors.
+    /// Whether the heads sweep back and forth in sectors.
     pub is_in_sectors: bool,
-    /// A head has not been heard since the dive began.
+    /// Whether a head has not pinged since the dive began.
     pub is_unheard: bool,
-    /// Changes that other settings of the heads would bring.
+    /// Effect of other settings of the heads.
     pub other: OtherSettings,
 }
 
-/// Ratios of other head settings to the present ones. A turn takes longer with a finer step or a longer
-/// range.
+/// Ratios of other head settings to the present settings.
+///
+/// A turn takes longer with a finer step or a longer range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherSettings {
-    /// Step of the coarsest mode that leaves room for the target, relative to the present step.
+    /// Ratio of steps: that of the coarsest mode whose step is below the target, to the present step.
     pub finer_step: f64,
-    /// Turn period of that mode, relative to the present one.
+    /// Ratio of turn periods: that of the mode with this finer step, to the present period.
     pub finer_turn: f64,
-    /// Turn period at the shortest range setting that reaches all wall from the centre, relative to the
-    /// present one.
+    /// Ratio of turn periods: that of a longer range setting, to the present period.
+    ///
+    /// The setting is the shortest that reaches all wall from the centre.
     pub longer_turn: f64,
 }
 
 impl Default for OtherSettings {
-    /// Ratios for heads with unknown settings: two modes finer, with the same turn period.
+    /// Ratios for heads with unknown settings: the second finer mode, with the same turn period.
     fn default() -> Self {
         Self { finer_step: 0.375, finer_turn: 1.0, longer_turn: 1.0 }
     }
@@ -114,7 +121,7 @@ impl Default for OtherSettings {
 const SLOWER: f64 = 0.97;
 
 impl Drive {
-    /// Distance between passes with the swing added, if no head had been silent or stalled, m.
+    /// Distance between passes including the swing, if no head had been silent or stalled, m.
     pub fn along_m(&self) -> f64 {
         self.speed_mps * self.healthy_gap_s + self.swing_m + self.advance_m()
     }
@@ -129,33 +136,32 @@ impl Drive {
         self.speed_mps * self.ping_period_s
     }
 
-    /// Whether driving slower than planned put the heads out of phase: passes are farther apart by a factor
-    /// above `over`.
+    /// Whether the heads are out of phase because the vehicle is slower than planned.
     ///
-    /// The comparison is with passes at the planned speed, with the heads at their scheduled angles. Heads
-    /// apart along the hull are in phase only near that speed. It counts only if that speed meets the target:
-    /// no speed mends heads that were started wrongly.
+    /// True if passes are farther apart by a factor above `over` than at the planned speed with the heads at their
+    /// scheduled angles. Heads apart along the hull are in phase only near the planned speed. The planned speed must
+    /// also meet the target: no speed helps heads that were started with wrong phases.
     pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
         let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
         let fits = self.fits_mps >= self.planned_mps;
         is_slower && fits && self.planned_along_m() > over * self.planned_mps * self.all_gap_s
     }
 
-    /// The drive with the larger distance between passes.
+    /// Returns the drive with the larger distance between passes.
     #[must_use]
     pub fn or_worse(self, other: Self) -> Self {
         if other.along_m() > self.along_m() { other } else { self }
     }
 }
 
-/// Reason for a ping without a sample.
+/// Reason why a ping left no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Loss {
     /// No return, although the wall was within range.
     Missing,
     /// The wall was farther than the range setting.
     OutOfRange,
-    /// Occluded by the vehicle.
+    /// The vehicle occluded the beam.
     Occluded,
 }
 
@@ -164,44 +170,44 @@ impl Loss {
     pub const ALL: [Self; 3] = [Self::Missing, Self::OutOfRange, Self::Occluded];
 }
 
-/// Ratio of the error of a section's largest hole to that of the distance between two passes at one point.
+/// Ratio of two errors: that of a section's largest hole, and that of a single pass distance.
 ///
-/// The maximum favours holes that errors have enlarged. Measured over the field dives of
+/// The largest hole is often one that errors have enlarged. The ratio is measured over the field dives of
 /// `tests/tests/navigation/fusion.rs`.
 const LARGEST_OF_MANY: f64 = 1.2;
 
-/// Error along the tunnel of a pass's samples relative to the previous pass.
+/// Error along the tunnel of the samples of a pass relative to the previous pass.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PassError {
     /// Covariance of the relative errors that move the samples.
     pub relative: Relative,
-    /// Vehicle position in the cross-section, [y, z], m.
+    /// Position of the vehicle in the cross-section, [y, z], m.
     pub from_m: [f64; 2],
 }
 
 impl PassError {
-    /// Error of the pass at a fix.
+    /// Creates the error of a pass at a fix.
     pub fn of(fix: &Fix) -> Self {
         Self { relative: fix.relative, from_m: [fix.pose.position.y(), fix.pose.position.z()] }
     }
 
-    /// Keeps the larger of the two.
+    /// Keeps the larger of two errors.
     pub fn add(&mut self, other: &Self) {
         if other.relative.sd_m(Vec3::zero()) >= self.relative.sd_m(Vec3::zero()) {
             *self = *other;
         }
     }
 
-    /// Largest standard deviation of a hole's diameter anywhere round the profile, m.
+    /// Returns the largest standard deviation of a hole's diameter anywhere around the profile, m.
     pub fn worst_m(&self, profile: &Profile) -> f64 {
         profile.places().iter().map(|place| self.sd_m(*place)).fold(0.0, f64::max)
     }
 
     /// Whether `worst_m` exceeds a limit, m.
     ///
-    /// Most passes are far below it, which shows without a search round the profile.
+    /// For most passes it is far below the limit. This is detected without a search around the profile.
     pub fn exceeds(&self, limit_m: f64, profile: &Profile) -> bool {
-        // The reference point lies within the profile, so no wall is farther from it than half the perimeter.
+        // The reference point lies within the profile, so no wall is farther from this point than half the perimeter.
         let [y_m, z_m] = profile.reference();
         let off_m = math::hypot(self.from_m[0] - y_m, self.from_m[1] - z_m);
         let here_m = LARGEST_OF_MANY * self.relative.sd_m(Vec3::zero());
@@ -209,13 +215,14 @@ impl PassError {
         at_most_m > limit_m && self.worst_m(profile) > limit_m
     }
 
-    /// Largest change of that standard deviation per metre of wall, m/m.
+    /// Largest change of the standard deviation of a hole's diameter per metre of wall, m/m.
     pub fn slope(&self) -> f64 {
         LARGEST_OF_MANY * self.relative.turn_sd_rad()
     }
 
-    /// Standard deviation of the diameter of a hole at a point on the wall, m. Its edges are consecutive
-    /// passes.
+    /// Returns the standard deviation of the diameter of a hole at a point on the wall, m.
+    ///
+    /// The hole lies between two consecutive passes.
     pub fn sd_m(&self, wall_m: [f64; 2]) -> f64 {
         LARGEST_OF_MANY
             * self.relative.sd_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
@@ -232,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_out_of_phase_needs_a_planned_speed_that_mends_it() {
+    fn slow_vehicle_is_a_phase_cause_only_if_the_planned_speed_helps() {
         let slow = Drive {
             speed_mps: 0.08,
             planned_mps: 0.1,
@@ -252,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn worst_error_is_kept_in_any_order() {
+    fn larger_error_is_kept_in_any_order() {
         for order in [[0.01, 0.05, 0.02], [0.05, 0.02, 0.01], [0.01, 0.02, 0.05]] {
             let mut worst = PassError::default();
             for sd_m in order {
@@ -263,25 +270,25 @@ mod tests {
     }
 
     #[test]
-    fn worst_pass_decides_the_hole_error() {
+    fn drive_with_the_larger_distance_between_passes_is_kept() {
         let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
         assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
         assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));
     }
 
     #[test]
-    fn yaw_moves_wall_beside_the_vehicle_not_above_it() {
+    fn yaw_error_moves_wall_beside_the_vehicle_but_not_above_it() {
         let yaw = Relative::new([[0.0; 3], [0.0; 3], [0.0, 0.0, 1e-4]]);
         let error = PassError { relative: yaw, from_m: [0.5, 1.0] };
         let profile = shapes::circle(3.0).unwrap();
         let sd_m = |wall_m: [f64; 2]| error.sd_m(wall_m) / LARGEST_OF_MANY;
         assert!((sd_m([2.5, 1.0]) - 0.02).abs() < 1e-12 && sd_m([0.5, 4.0]).abs() < 1e-12);
-        // The farthest wall to either side, 3.5 m away.
+        // The farthest wall to either side is 3.5 m away.
         let [y_m, _] = profile.reference();
         let worst_m = LARGEST_OF_MANY * 0.01 * (3.0 + (y_m - 0.5).abs());
         assert!((error.worst_m(&profile) - worst_m).abs() < 1e-4, "{}", error.worst_m(&profile));
         assert!((error.slope() - LARGEST_OF_MANY * 0.01).abs() < 1e-12);
-        // The vehicle's estimated place is inside, and far outside as a lost estimate may be.
+        // The first estimated position is inside the profile. The second is far outside, as a lost estimate may be.
         for from_m in [error.from_m, [40.0, -30.0]] {
             let error = PassError { from_m, ..error };
             let worst_m = error.worst_m(&profile);

@@ -1,4 +1,4 @@
-//! Relief: places where heads lately found the wall off the design, and heads that others outvote.
+//! Relief: places where heads recently found wall off the design, and votes of the heads on each other.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,20 +7,21 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
 
-/// Bins around the perimeter: about a step of a head.
+/// Number of bins around the perimeter; a bin is about as wide as a step of a head.
 const BINS: i64 = 128;
-/// Bins along the tunnel, each half a reach long: 9 m in a tunnel of 6 m radius, more than heads are apart.
+/// Number of bins along the tunnel, each half a reach long.
+///
+/// In a tunnel of 6 m radius, all bins together are 9 m long, which exceeds the distance between heads.
 const SLABS: i64 = 32;
 
 /// Findings in a bin.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Cell {
-    /// Number of the slab since chainage zero. A bin of another slab is stale.
+    /// Number of the slab since chainage zero; a bin of another slab is outdated.
     slab: i64,
-    /// The latest return off the design, and whether it was wall.
+    /// The latest return off the design, and whether it was classified as wall.
     off: Option<(PlacedReturn, bool)>,
-    /// Bitmasks of the heads whose returns agree with the design here, and of those whose returns contradict
-    /// it.
+    /// Bitmasks of heads whose returns in this bin agree with the design, and contradict the design.
     as_designed: u8,
     contradicting: u8,
 }
@@ -28,16 +29,16 @@ struct Cell {
 /// Votes on a head, counted in bins that other heads have seen, too.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ballot {
-    /// Bins in which it agrees with the design as others do.
+    /// Number of bins in which the head agrees with the design, as other heads do.
     agreed: u32,
-    /// Bins in which it contradicts the design where others agree with it.
+    /// Number of bins in which the head contradicts the design, while other heads agree with it.
     outvoted: u32,
     /// Sum of the deviations in the outvoted bins, m, and the range of their chainages.
     off_sum_m: f64,
     between_m: Option<[f64; 2]>,
 }
 
-/// Votes needed: about a turn of bins.
+/// Number of votes needed for a decision: about the bins of a turn.
 const FULL_BALLOT: u32 = 128;
 
 impl Ballot {
@@ -59,13 +60,15 @@ impl Ballot {
         self.between_m = Some([from_m.min(placed.x_m), to_m.max(placed.x_m)]);
     }
 
-    /// Mean deviation and chainages, m, of the outvoted bins; `None` unless they are most of a turn's bins.
+    /// Returns the mean deviation and the chainages of the outvoted bins, m.
+    ///
+    /// `None` unless enough bins have votes, and most of these bins are outvoted.
     pub(super) fn verdict(&self) -> Option<(f64, [f64; 2])> {
         let lost = self.agreed + self.outvoted >= FULL_BALLOT && self.outvoted > self.agreed;
         lost.then(|| Some((self.off_sum_m / f64::from(self.outvoted), self.between_m?))).flatten()
     }
 
-    /// Whether at least a quarter of its bins speak against the head.
+    /// Whether more than a quarter of the head's bins are outvoted.
     pub(super) fn is_lost(&self) -> bool {
         4 * self.outvoted > self.agreed + self.outvoted
     }
@@ -78,14 +81,16 @@ pub struct Relief {
     ballots: [Ballot; MAX_HEADS],
     /// Bitmask of heads that aren't trusted.
     distrusted: u8,
-    /// Bitmask of heads whose ranges change as the design's do.
+    /// Bitmask of heads whose range changes as the range to the design does.
     changing: u8,
 }
 
 stateful!(Relief { state: ballots, distrusted, changing; slots: cells; });
 
 impl Default for Relief {
-    /// An empty relief. Allocates: all that it will ever use.
+    /// Creates an empty relief.
+    ///
+    /// Allocates: all that it will ever use.
     fn default() -> Self {
         let nowhere = Cell { slab: i64::MIN, ..Cell::default() };
         let count = usize::try_from(BINS * SLABS).unwrap_or(0);
@@ -107,9 +112,9 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 }
 
 impl Relief {
-    /// Whether nearby wall was found with the same deviation from the design.
+    /// Whether earlier returns near this place have the same deviation from the design.
     ///
-    /// An earlier wall return counts within the reach along the tunnel, a doubtful one at half the distances.
+    /// An earlier wall return counts within the reach along the tunnel, a doubtful one within half of all limits.
     pub(super) fn supports(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
         let (slab, bin) = place(placed, limits);
         (slab - 2..=slab + 2).any(|slab| {
@@ -124,7 +129,7 @@ impl Relief {
         })
     }
 
-    /// Remembers a return off the design for later passes.
+    /// Stores a return off the design as support for later passes.
     pub(super) fn remember(&mut self, placed: &PlacedReturn, is_wall: bool, limits: &WallLimits) {
         if limits.is_design(placed) {
             return;
@@ -138,7 +143,7 @@ impl Relief {
     /// Counts a head's vote in its bin, and its effect on the votes of other heads.
     pub(super) fn vote(&mut self, head: usize, placed: &PlacedReturn, limits: &WallLimits) {
         let (slab, bin) = place(placed, limits);
-        // Returns between the two limits don't vote: noise would make heads disagree at the limit.
+        // Returns between the two limits don't vote, because noise would make heads disagree at a single limit.
         let as_designed = placed.off_m.abs() <= limits.contradiction_m / 2.0;
         if !as_designed && placed.off_m.abs() <= limits.contradiction_m {
             return;
@@ -146,7 +151,7 @@ impl Relief {
         let (me, distrusted) = (bit(head), self.distrusted);
         let Some(cell) = self.cell_mut(slab, bin) else { return };
         if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
-            // A head sees the design here, so an object met once is gone.
+            // A head sees the design here, so an object that was seen only once is gone.
             cell.off = None;
         }
         let seen = if as_designed { &mut cell.as_designed } else { &mut cell.contradicting };
@@ -184,23 +189,24 @@ impl Relief {
         }
     }
 
-    /// Votes on a head.
+    /// Returns the votes on a head.
     pub(super) fn ballot(&self, head: usize) -> Ballot {
         self.ballots.get(head).copied().unwrap_or_default()
     }
 
-    /// Sets whether a head's votes count.
+    /// Sets whether the votes of a head count.
     pub(super) fn believe(&mut self, head: usize, believed: bool) {
         set(&mut self.distrusted, head, !believed);
     }
 
-    /// Records whether a head's range changes as the design's does.
+    /// Records whether the range of a head changes as the range to the design does.
     pub(super) fn note_changing(&mut self, head: usize, changes: bool) {
         set(&mut self.changing, head, changes);
     }
 
-    /// Whether another head's range changes as the design's does. Then no error of the estimate explains this
-    /// head's constant range.
+    /// Whether the range of another head changes as the range to the design does.
+    ///
+    /// If so, no error of the estimate explains this head's constant range.
     pub(super) fn others_change(&self, head: usize) -> bool {
         self.changing & !bit(head) != 0
     }
@@ -209,7 +215,7 @@ impl Relief {
         self.cells.get(index(slab, bin)?).filter(|cell| cell.slab == slab)
     }
 
-    /// Cell of a bin, emptied if it belonged to another slab.
+    /// Returns the cell of a bin, emptied if it belonged to another slab.
     fn cell_mut(&mut self, slab: i64, bin: i64) -> Option<&mut Cell> {
         let cell = self.cells.get_mut(index(slab, bin)?)?;
         if cell.slab != slab {
@@ -219,7 +225,7 @@ impl Relief {
     }
 }
 
-/// Slab along the tunnel and bin around the perimeter.
+/// Returns the slab along the tunnel and the bin around the perimeter.
 fn place(placed: &PlacedReturn, limits: &WallLimits) -> (i64, i64) {
     let slab = math::floor_to_i64(2.0 * placed.x_m / limits.reach_m);
     (slab, math::floor_to_i64(placed.arc_m / limits.perimeter_m * BINS as f64))
@@ -233,10 +239,9 @@ fn index(slab: i64, bin: i64) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// Old votes are forgotten by halves. A head that fails late is therefore outvoted within about a turn or
-    /// two, and not by a few bins.
+    /// A head that fails late is outvoted within one or two turns, but not by a few bins.
     #[test]
-    fn ballot_forgets_by_halves() {
+    fn ballot_halves_old_votes() {
         let wrong = PlacedReturn { x_m: 7.0, arc_m: 0.0, off_m: -0.5 };
         let mut ballot = Ballot::default();
         (0..1027).for_each(|_| ballot.add(None));
@@ -248,9 +253,9 @@ mod tests {
         assert!(between_m.iter().all(|x_m| (x_m - 7.0).abs() < 1e-12), "{between_m:?}");
     }
 
-    /// A head that contradicts another one is outvoted, unless the other one isn't trusted itself.
+    /// A head that contradicts another head is outvoted, unless the other head is itself distrusted.
     #[test]
-    fn distrusted_head_outvotes_no_other_head() {
+    fn distrusted_head_does_not_outvote_other_heads() {
         let limits = WallLimits::new(20.0, 0.3);
         let of = |off_m: f64| PlacedReturn { x_m: 7.0, arc_m: 3.0, off_m };
         let outvoted = |believed: bool| {

@@ -11,52 +11,54 @@ use headrace_geometry::time::MonoNs;
 
 /// Maximum gap between neighbouring failed sections of one run, m.
 ///
-/// Over a longer gap the speed that one section needs is no evidence for the next.
+/// Across a wider gap, the speed that one section needs is no evidence for the next section.
 const JOIN_M: f64 = 0.5;
 
-/// Number of a run. It is never reused.
+/// Number of a run, which is never used again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
 /// A run of neighbouring failed sections.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Cause of most of its sections; of two equally frequent causes the one that was in the lead first.
+    /// Cause of most of the run's sections.
+    ///
+    /// If two causes are equally frequent, the earlier main cause is kept.
     pub cause: Cause,
-    /// Number of its sections with each cause, in the order of [`Cause::ALL`].
+    /// Number of the run's sections with each cause, in the order of [`Cause::ALL`].
     counts: [u32; Cause::ALL.len()],
-    /// Counts for the advice on passing it again.
+    /// Counts for the advice on passing the run again.
     tally: Tally,
     /// Index of the first section.
     pub from: i64,
-    /// Index after the last.
+    /// Index after the last section.
     pub to: i64,
-    /// Number of its sections that fail.
+    /// Number of the run's sections that fail.
     pub failed: u32,
-    /// Section with the largest hole, and that hole. Once cleared, the last one before that.
+    /// Section with the largest hole, and this hole; for a cleared run, the last one before clearing.
     pub worst: (i64, Hole),
-    /// Time of its first flag.
+    /// Time of the run's first flag.
     pub raised: MonoNs,
-    /// Time of its last change.
+    /// Time of the run's last change.
     pub changed: MonoNs,
-    /// Time from which none of its sections fails.
+    /// Time since which none of the run's sections fails.
     pub cleared: Option<MonoNs>,
-    /// Run into which it was merged.
+    /// Run into which this run was merged.
     pub merged_into: Option<RunId>,
 }
 
 impl Run {
-    /// Whether part of it still fails.
+    /// Whether any section of the run still fails.
     pub fn is_open(&self) -> bool {
         self.failed > 0
     }
 
-    /// Number of its sections with a cause.
+    /// Number of the run's sections with a cause.
     pub fn count(&self, cause: Cause) -> u32 {
         self.counts.get(cause as usize).copied().unwrap_or(0)
     }
 
-    /// Causes named in texts: the main one, and the next if a tenth of the sections have it.
+    /// Causes named in texts: the main cause, and the next one if a tenth of the sections have it.
     pub fn named(&self) -> Causes {
         let others = Cause::ALL.into_iter().filter(|cause| *cause != self.cause);
         let next = others.rev().max_by_key(|cause| self.count(*cause));
@@ -64,7 +66,9 @@ impl Run {
         next.map_or(Causes::of(self.cause), |next| Causes::of(self.cause).with(next))
     }
 
-    /// All causes of its sections: the main one, then the others by frequency. Allocates: for outlets.
+    /// All causes of the run's sections: the main cause first, then the others by frequency.
+    ///
+    /// Allocates: for outlets.
     pub fn causes(&self) -> Vec<Cause> {
         let mut causes: Vec<Cause> =
             Cause::ALL.into_iter().filter(|cause| *cause == self.cause || self.count(*cause) > 0).collect();
@@ -72,12 +76,12 @@ impl Run {
         causes
     }
 
-    /// Advice for passing it again.
+    /// Advice for passing the run again.
     pub fn again(&self) -> Again {
         self.tally.again(self.failed)
     }
 
-    /// Counts a section.
+    /// Adds a section to the counts.
     fn count_in(&mut self, section: &Failing) {
         self.tally.add(section);
         for cause in section.causes.iter() {
@@ -87,7 +91,7 @@ impl Run {
         }
     }
 
-    /// Removes a section from the counts. True if the lowest speed must be found again.
+    /// Removes a section from the counts; returns true if the lowest speed must be found again.
     fn count_out(&mut self, section: &Failing) -> bool {
         for cause in section.causes.iter() {
             if let Some(count) = self.counts.get_mut(cause as usize) {
@@ -115,9 +119,9 @@ impl Run {
 pub enum RunChange {
     /// New run.
     Raised,
-    /// Its ends, worst hole or extent have changed.
+    /// The ends, the causes or the worst hole of the run have changed.
     Changed,
-    /// None of its sections fails any more: a later pass filled them.
+    /// No section of the run fails any more, because a later pass filled the holes.
     Cleared,
     /// Merged into another run.
     Merged,
@@ -129,9 +133,9 @@ pub struct Runs {
     first: i64,
     join: i64,
     runs: Vec<Run>,
-    /// For each section: the number of its run plus one, or zero.
+    /// Number of the run plus one for each section, or zero.
     member: Vec<u32>,
-    /// For each section of a run: its causes.
+    /// Causes of each section of a run.
     failing: Vec<Failing>,
 }
 
@@ -148,7 +152,7 @@ pub struct Telling<'a> {
 }
 
 impl Runs {
-    /// An empty set of runs for `count` sections of length `section_m` from index `first`.
+    /// Creates an empty set of runs for `count` sections of length `section_m` from index `first`.
     ///
     /// Allocates: at startup, all that it will ever use.
     pub fn new(first: i64, count: usize, section_m: f64) -> Self {
@@ -157,17 +161,17 @@ impl Runs {
         Self { first, join, runs: Vec::with_capacity(count), member, failing }
     }
 
-    /// All runs so far, by number.
+    /// Returns all runs so far, by number.
     pub fn all(&self) -> &[Run] {
         &self.runs
     }
 
-    /// A run by its number.
+    /// Returns a run by its number.
     pub fn get(&self, id: RunId) -> Option<&Run> {
         self.runs.get(id.0 as usize)
     }
 
-    /// The run that a section belongs to.
+    /// Returns the run to which a section belongs.
     pub fn of(&self, section: i64) -> Option<RunId> {
         self.member.get(self.slot(section)?).copied()?.checked_sub(1).map(RunId)
     }
@@ -177,7 +181,7 @@ impl Runs {
         section - run.to >= self.join || run.from - section > self.join
     }
 
-    /// Sets the state of a section: it fails for these causes, or doesn't fail (`None`).
+    /// Sets the state of a section: it fails for these causes, or it doesn't fail (`None`).
     ///
     /// Allocates: never.
     pub fn set(&mut self, section: i64, failing: Option<Failing>, telling: &mut Telling<'_>) {
@@ -272,7 +276,7 @@ impl Runs {
 
     fn begin(&mut self, section: i64, failing: Failing, telling: &Telling<'_>) -> Option<RunId> {
         if self.runs.len() == self.runs.capacity() {
-            // There were more runs than sections: this section remains flagged, but in no run.
+            // If there were more runs than sections, this section remains flagged without a run.
             return None;
         }
         let id = RunId(u32::try_from(self.runs.len()).ok()?);
@@ -382,7 +386,7 @@ impl Runs {
     }
 }
 
-/// Section with the larger hole; the first if both are equal.
+/// Returns the section with the larger hole; the first one if both holes are equal.
 fn larger(a: (i64, Hole), b: (i64, Hole)) -> (i64, Hole) {
     if b.1.diameter_m > a.1.diameter_m { b } else { a }
 }

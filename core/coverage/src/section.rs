@@ -15,14 +15,16 @@ use headrace_geometry::tunnel::Profile;
 /// Coverage verdict of a section. Source: docs/why/coverage.md, "Verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Undecided: samples may still land without the vehicle turning back, or not all heads have been there.
+    /// Undecided: samples may still land, or not all heads have passed the section.
+    ///
+    /// Samples count only if they may land without the vehicle turning back.
     #[default]
     Open,
     /// D + k sd <= T, where k is the confidence.
     Pass,
     /// D - k sd > T.
     Fail,
-    /// Neither holds within the error of D.
+    /// Neither condition holds within the error of D.
     CannotSay,
 }
 
@@ -51,7 +53,7 @@ pub struct Spread {
     /// Largest value.
     pub max: f64,
     mean: f64,
-    /// Sum of the squared distances from the mean.
+    /// Sum of the squared differences from the mean.
     scatter: f64,
 }
 
@@ -67,9 +69,10 @@ impl Spread {
         self.merge(&Self { count: 1, min: value, max: value, mean: value, scatter: 0.0 });
     }
 
-    /// Merges another spread.
+    /// Merges another spread into this one.
     ///
-    /// Source: Chan, Golub, LeVeque 1983: sums of squares about the mean avoid the cancellation of plain ones.
+    /// Source: Chan, Golub, LeVeque 1983: sums of squares about the mean avoid the cancellation of plain sums of
+    /// squares.
     pub fn merge(&mut self, other: &Self) {
         if other.count == 0 {
             return;
@@ -88,7 +91,7 @@ impl Spread {
         (self.count > 0).then_some(self.mean)
     }
 
-    /// Standard deviation of the values themselves; `None` without values.
+    /// Standard deviation of the values (not of their mean); `None` without values.
     pub fn sd(&self) -> Option<f64> {
         (self.count > 0).then(|| math::sqrt(self.scatter / f64::from(self.count)))
     }
@@ -115,11 +118,11 @@ pub struct Section {
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
-    /// No further sample on the present course can change the verdict, nor the hole of a fail.
+    /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
     pub settled: bool,
-    /// Open, although no sample will change it without turning back.
+    /// Whether the section is open although no sample can change it without the vehicle turning back.
     ///
-    /// The vehicle began or turned back here, so not all heads have passed.
+    /// The vehicle began or turned back in this section, so not all heads have passed it.
     pub not_inspected: bool,
     /// Time at which the fail was flagged.
     pub flagged: Option<MonoNs>,
@@ -127,51 +130,52 @@ pub struct Section {
     pub cleared: Option<MonoNs>,
     /// Causes of the fail.
     pub evidence: Option<Evidence>,
-    /// The causes were found when the heads had left only a part of the section.
+    /// Whether the causes were found when the heads had left only a part of the section.
     pub(super) explained_in_part: bool,
-    /// Ping statistics of its passage.
+    /// Ping statistics of the passage through the section.
     pub passage: Passage,
-    /// T_x of its samples, m.
+    /// T_x of the section's samples, m.
     pub t_x_m: Spread,
-    /// T_y of its samples, m.
+    /// T_y of the section's samples, m.
     pub t_y_m: Spread,
-    /// T of its samples, m.
+    /// T of the section's samples, m.
     pub t_m: Spread,
-    /// Samples on its wall.
+    /// Number of samples on the section's wall.
     pub samples: u32,
-    /// Deviation of its wall from the design profile.
+    /// Deviation of the section's wall from the design profile.
     pub deviation: Deviation,
-    /// Share of its wall that is a declared opening.
+    /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
-    /// Samples have landed within T of it since it was last judged.
+    /// Whether samples have landed within T of the section since it was last judged.
     pub(super) stale: bool,
-    /// Returns on its wall that were not accepted as wall.
+    /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful: u32,
-    /// It holds samples of a head that was distrusted soon after.
+    /// Whether the section holds samples of a head that was distrusted soon after.
     pub suspect: bool,
-    /// Number of the newest visit at the time of that distrust.
+    /// Number of the newest visit when this head became distrusted.
     suspected_in: u32,
-    /// Visits with samples within T of it.
+    /// Visits with samples within T of the section.
     pub(super) visits: Visits,
     /// Number of the visit that the pass error in `passage` belongs to.
     passed_in: u32,
 }
 
-/// Minimum samples for a section to contradict the profile.
+/// Minimum number of samples with which a section can contradict the profile.
 const FEW: u32 = 20;
-/// Masked share above which a section counts as having no wall.
+/// Share of the wall covered by openings above which a section counts as having no wall.
 const ALL_MASKED: f64 = 0.999;
-/// Plausible ratios of the cross-section area to the design's. A deviation of a tenth of the radius gives 0.8
-/// to 1.2.
+/// Plausible ratios of the cross-section area to the design's area.
+///
+/// A deviation of a tenth of the radius gives 0.8 to 1.2.
 const AREA_RATIO: core::ops::RangeInclusive<f64> = 0.6..=1.6;
 
 impl Section {
-    /// Whether it has a flag that no later pass has cleared.
+    /// Whether the section has a flag that no later pass has cleared.
     pub fn is_flagged(&self) -> bool {
         self.flagged.is_some() && self.cleared.is_none()
     }
 
-    /// Whether its samples contradict the design profile, on which all other measurements rely.
+    /// Whether the section's samples contradict the design profile, on which all other measurements rely.
     pub fn contradicts(&self) -> bool {
         self.samples >= FEW && self.deviation.contradicts()
     }
@@ -186,7 +190,7 @@ impl Section {
         self.passage.pass_error.add(&pass);
     }
 
-    /// Whether it had earlier visits, and its newest visit has only samples of trusted heads.
+    /// Whether the section had earlier visits, and its newest visit has only samples of trusted heads.
     pub(super) fn is_visited_anew(&self) -> bool {
         self.visits.are_several() && !(self.suspect && self.visits.newest() <= self.suspected_in)
     }
@@ -197,16 +201,16 @@ impl Section {
         self.suspect = false;
     }
 
-    /// Reason for which a small hole is no evidence of coverage; `None` if it is evidence.
+    /// Returns the reason why a small hole is no evidence of coverage; `None` if it is evidence.
     ///
-    /// The returns accepted as wall may be something else, or the samples may not lie beside one another.
+    /// The returns accepted as wall may be something else, or the relative positions of the samples may be uncertain.
     pub(super) fn doubt(&self) -> Option<Unsure> {
         let of_heads = self.suspect.then_some(Unsure::DistrustedHead);
         let of_places = self.visits.are_unrelated().then_some(Unsure::SeveralStretches);
         self.wall_doubt().or(of_heads).or(of_places)
     }
 
-    /// Reason for which most returns accepted as wall may be something else.
+    /// Returns the reason why most returns accepted as wall may be something else.
     pub(super) fn wall_doubt(&self) -> Option<Unsure> {
         Some(match self {
             _ if self.contradicts() => Unsure::ContradictedProfile,
@@ -217,7 +221,9 @@ impl Section {
         })
     }
 
-    /// Reason for which it neither passes nor fails although no more samples will come; `None` otherwise.
+    /// Returns the reason why the section neither passes nor fails although no more samples will come.
+    ///
+    /// `None` if the section passes or fails, or if samples may still come.
     pub fn unsure(&self) -> Option<Unsure> {
         match self.verdict {
             Verdict::Open if self.not_inspected => Some(Unsure::NotInspected),
@@ -226,19 +232,21 @@ impl Section {
         }
     }
 
-    /// Whether its cross-section area is implausible for the design.
+    /// Whether the section's cross-section area is implausible for the design.
     fn is_of_another_size(&self) -> bool {
         let ratio = self.deviation.area_ratio().filter(|_| self.samples >= FEW);
         ratio.is_some_and(|ratio| !AREA_RATIO.contains(&ratio))
     }
 
-    /// Marks that it holds samples of a distrusted head: it can't pass, and is due for judging.
+    /// Records that the section holds samples of a distrusted head.
+    ///
+    /// The section then can't pass, and is due for judging.
     pub fn suspect(&mut self) {
         (self.suspect, self.stale, self.settled) = (true, true, false);
         self.suspected_in = self.visits.newest();
     }
 
-    /// Raises or clears its flag according to its verdict.
+    /// Raises or clears the section's flag according to the verdict.
     pub(super) fn flag(&mut self, at: MonoNs) -> Judgement {
         match self.verdict {
             Verdict::Fail if !self.is_flagged() => {
@@ -259,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn section_is_flagged_from_flag_to_clearing() {
+    fn section_is_flagged_until_the_flag_is_cleared() {
         let at = |seconds: u64| Some(MonoNs(seconds * 1_000_000_000));
         let flagged = |flagged, cleared| Section { flagged, cleared, ..Section::default() }.is_flagged();
         assert_eq!([flagged(None, None), flagged(at(3), None), flagged(at(3), at(9))], [false, true, false]);
@@ -295,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_is_exact_far_from_zero_and_after_merging() {
+    fn spread_is_accurate_far_from_zero_and_after_merging() {
         let values = [1e8 + 1.0, 1e8 + 2.0, 1e8 + 4.0, 1e8 + 9.0];
         let (mut whole, mut first, mut second) = (Spread::default(), Spread::default(), Spread::default());
         for (k, value) in values.into_iter().enumerate() {
@@ -310,7 +318,7 @@ mod tests {
         assert_eq!((Spread::default().mean(), Spread::default().sd()), (None, None));
     }
 
-    /// An open section is unsure only at an end of the coverage extent.
+    /// An open section is unsure only if it is at an end of the coverage extent.
     #[test]
     fn open_section_is_unsure_only_at_an_end_of_the_coverage_extent() {
         let unsure = |not_inspected| Section { not_inspected, ..Section::default() }.unsure();

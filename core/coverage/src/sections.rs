@@ -31,19 +31,19 @@ pub struct Request {
     pub section: i64,
     /// Time of the request.
     pub at: MonoNs,
-    /// Stretch that every awaited head had swept by then.
+    /// Stretch that every awaited head had swept at this time.
     pub swept_by_all: Option<Reach>,
-    /// No head was alive then.
+    /// Whether no head was alive at this time.
     pub none_alive: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Stretch that not all heads have passed, nor will without the vehicle turning back.
+    /// Stretch that not all heads have passed, and will not pass without the vehicle turning back.
     pub not_passed: Option<Reach>,
-    /// Set at the end of the dive: the stretch that all heads have passed.
+    /// Stretch that all heads have passed; `None` before the end of the dive.
     pub ended: Option<Ended>,
-    /// Judge only for a certain fail: a large enough empty circle that can get no more samples.
+    /// Whether to judge only a certain fail: a large empty circle in which no more samples can land.
     ///
-    /// The circle need not be the largest.
+    /// The circle need not be the largest one.
     pub only_fails: bool,
 }
 
@@ -52,14 +52,16 @@ pub struct Request {
 pub struct Ended(pub Option<Reach>);
 
 impl Ended {
-    /// Whether a hole extends to where not all heads have passed.
+    /// Whether a hole extends to wall that not all heads have passed.
     fn is_beyond(self, hole: &Hole) -> bool {
         let radius_m = hole.diameter_m / 2.0;
         self.0.is_none_or(|all| hole.x_m - radius_m < all.from_m || hole.x_m + radius_m > all.to_m)
     }
 }
 
-/// Default confidence: standard deviations of D between hole and target for a verdict of pass or fail.
+/// Default confidence of a pass or a fail.
+///
+/// The confidence is the number of standard deviations of D between hole and target.
 pub const CONFIDENCE_SD: f64 = 2.0;
 
 impl Request {
@@ -84,7 +86,7 @@ struct Measured {
     hole: Hole,
     /// Standard deviation of the hole's diameter, m.
     sd_m: f64,
-    /// The newest visit alone shows that the section passes.
+    /// Whether the newest visit alone shows that the section passes.
     by_newest: bool,
 }
 
@@ -107,25 +109,27 @@ pub struct Judging<'a> {
 pub struct Sections {
     section_m: f64,
     target_m: f64,
-    /// Standard deviations of D by which a pass or a fail must clear the target.
+    /// Number of standard deviations of D by which a pass or a fail must differ from the target.
     confidence_sd: f64,
-    /// Distance before a missed stretch at which the vehicle's origin is to turn round, m.
+    /// Distance before a missed stretch at which the vehicle's origin should turn round, m.
     run_up_m: f64,
     first: i64,
-    /// Judged sections by verdict, in the order of [`Verdict::ALL`]. The last entry counts open sections that
-    /// were not inspected.
+    /// Number of judged sections by verdict, in the order of [`Verdict::ALL`].
+    ///
+    /// The last entry counts open sections that were not inspected.
     judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
-    /// Least and greatest chainage of the heads' reach at which sections behind and ahead are next checked,
-    /// m.
+    /// Ends of the heads' reach at which sections are checked next, as chainages, m.
+    ///
+    /// The first applies to sections behind the heads, the second to sections ahead.
     next_look_m: [f64; 2],
 }
 
 stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: section_m, target_m, confidence_sd, run_up_m, first; });
 
 impl Sections {
-    /// Sections of `section_m` over [`from_m`, `to_m`].
+    /// Creates sections of `section_m` over [`from_m`, `to_m`].
     ///
     /// Allocates: at startup, all that it will ever use.
     pub fn new(section_m: f64, target_m: f64, from_m: f64, to_m: f64) -> Self {
@@ -158,14 +162,14 @@ impl Sections {
         Self { run_up_m: reach_m + self.target_m, ..self }
     }
 
-    /// Chainage to which the vehicle's origin has to go back, m, rounded to a decimetre.
+    /// Returns the chainage to which the vehicle's origin has to go back, m, rounded to a decimetre.
     ///
-    /// From there all heads pass a stretch from its beginning.
+    /// From this chainage, all heads pass the stretch from its beginning.
     pub fn back_to_m(&self, start_m: f64) -> f64 {
         back_to_m(start_m, self.run_up_m)
     }
 
-    /// The runs of flagged sections.
+    /// Returns the runs of flagged sections.
     pub fn runs(&self) -> &Runs {
         &self.runs
     }
@@ -201,18 +205,19 @@ impl Sections {
         self.target_m
     }
 
-    /// Standard deviations of D by which a pass or a fail must clear the target.
+    /// Number of standard deviations of D by which a pass or a fail must differ from the target.
     pub fn confidence_sd(&self) -> f64 {
         self.confidence_sd
     }
 
-    /// Distance from the heads' reach at which a section is left, m. Samples farther away don't change a
-    /// pass.
+    /// Distance from the heads' reach at which a section is left, m.
+    ///
+    /// Samples farther away don't change a pass.
     pub fn left_m(&self) -> f64 {
         self.target_m / 2.0
     }
 
-    /// Index of the section at a chainage.
+    /// Returns the index of the section at a chainage.
     pub fn index_of(&self, x_m: f64) -> i64 {
         math::floor_to_i64(x_m / self.section_m)
     }
@@ -222,12 +227,12 @@ impl Sections {
         (index as f64 * self.section_m, (index + 1) as f64 * self.section_m)
     }
 
-    /// A section by its index from chainage zero.
+    /// Returns a section by its index from chainage zero.
     pub fn get(&self, index: i64) -> Option<&Section> {
         self.sections.get(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Mutable access to a section by its index.
+    /// Returns mutable access to a section by its index.
     pub fn get_mut(&mut self, index: i64) -> Option<&mut Section> {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
@@ -251,7 +256,7 @@ impl Sections {
         let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
         let section = self.get(request.section)?;
         if section.verdict == Verdict::Pass && section.visits.are_several() && section.doubt().is_none() {
-            // A later visit doesn't take back a pass of an earlier one.
+            // A later visit does not revoke the pass of an earlier visit.
             return None;
         }
         let asks = request.only_fails || request.ended.is_some() || section.is_flagged();
@@ -278,13 +283,13 @@ impl Sections {
             section.verdict = Verdict::Pass;
             section.keep_newest_visit();
         }
-        // More samples don't change a pass. Samples outside a hole's radius don't change the hole.
+        // More samples do not change a pass. Samples outside a hole's radius do not change the hole.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
         let alone = verdict(&hole, error_m, target_m, clear_m);
         section.not_inspected = section.verdict == Verdict::Open && alone != Verdict::Open;
         if section.not_inspected {
-            // The largest hole extends to where not all heads have passed. Another hole may still fail by
-            // itself.
+            // The largest hole extends to wall that not all heads have passed. Another hole may still make the
+            // section fail.
             let radius_m = f64::midpoint(target_m, error_m);
             section.settled &=
                 clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
@@ -294,14 +299,14 @@ impl Sections {
             }
         }
         let section = self.get_mut(request.section)?;
-        // No more samples will come.
+        // At the end of the dive, no more samples will come.
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         if request.ended.is_some() && section.verdict == Verdict::Open && section.is_flagged() {
             // The section was missed, and the dive ended on the way back over it.
             (section.verdict, section.not_inspected) = (Verdict::Fail, false);
         }
-        // The missing samples of an unchanged hole may have been dropped since, so its evidence is kept.
+        // The evidence of an unchanged hole is kept, because its missing samples may no longer be stored.
         if section.verdict == Verdict::Fail && !is_same {
             let evidence = self.explain(&hole, request, judging);
             let evidence = self.as_beside(request.section, evidence);
@@ -315,9 +320,9 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Evidence of a section; if its cause is unknown, that of a flagged neighbour.
+    /// Returns the evidence of a section, or that of a flagged neighbour if its cause is unknown.
     ///
-    /// The edge of a stretch has the causes of the stretch.
+    /// The edge of a stretch thus has the causes of the stretch.
     fn as_beside(&self, index: i64, evidence: Evidence) -> Evidence {
         if evidence.cause != Cause::Unknown {
             return evidence;
@@ -329,13 +334,15 @@ impl Sections {
         }
     }
 
-    /// Slot in which a judged section is counted.
+    /// Returns the slot in which a judged section is counted.
     fn counted(section: &Section) -> Option<usize> {
         section.hole?;
         Some(if section.not_inspected { Verdict::ALL.len() } else { section.verdict as usize })
     }
 
-    /// The hole that counts: that of all visits, unless the newest visit alone shows that the section passes.
+    /// Measures the hole that counts.
+    ///
+    /// The hole is that of all visits, unless the newest visit alone shows that the section passes.
     fn measure(&self, index: i64, judging: &mut Judging<'_>) -> Option<Measured> {
         let Judging { store, finder, profile, .. } = judging;
         let ((from_m, to_m), pass_error) = (self.bounds_m(index), self.pass_error(index));
@@ -357,7 +364,7 @@ impl Sections {
         Some(Measured { hole, sd_m, by_newest: false })
     }
 
-    /// Moves a judged section from its previous slot in the counts to its present one.
+    /// Moves a judged section from its previous slot in the counts to its present slot.
     fn count(&mut self, before: Option<usize>, now: Option<usize>) {
         if let Some(count) = before.and_then(|before| self.judged.get_mut(before)) {
             *count -= 1;
@@ -367,7 +374,7 @@ impl Sections {
         }
     }
 
-    /// Metres of the coverage extent by verdict. Their sum is the length of its sections.
+    /// Returns the metres of the coverage extent by verdict; their sum is the total length of the sections.
     pub fn metres(&self, way: Option<Reach>) -> Metres {
         let mut metres = Metres::default();
         let (mut all, section_m) = (self.sections_of(way).count(), self.section_m);
@@ -382,7 +389,9 @@ impl Sections {
         metres
     }
 
-    /// Error of a section's passes. If no head pinged in it, the largest of those within T / 2.
+    /// Returns the error of a section's passes.
+    ///
+    /// If no head pinged in the section, the result is the largest error within T / 2.
     fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
@@ -395,7 +404,7 @@ impl Sections {
         })
     }
 
-    /// Adds a flagged section to its run; removes one whose flag was cleared.
+    /// Adds a flagged section to its run, or removes a section whose flag was cleared.
     fn tell_runs(&mut self, request: &Request, judging: &mut Judging<'_>) {
         let Self { sections, runs, first, .. } = self;
         let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
@@ -406,9 +415,9 @@ impl Sections {
         runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// Causes of a hole, from the passages of the sections within T.
+    /// Determines the causes of a hole, from the passages of the sections within T.
     ///
-    /// If the heads haven't left the whole section yet, the largest hole in the part left counts.
+    /// If the heads have left only a part of the section, the largest hole in this part counts.
     fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
         let mut bounds_m = self.bounds_m(request.section);
         let near = self.index_of(bounds_m.0 - self.target_m)..=self.index_of(bounds_m.1 + self.target_m);
@@ -445,15 +454,16 @@ impl Sections {
         explain(&case, passages, judging.store, judging.finder)
     }
 
-    /// Evidence for one cause of a run, from the section with the largest hole if it has that cause.
+    /// Returns the evidence for one cause of a run.
     ///
-    /// Otherwise from the last section with it.
+    /// The evidence is that of the section with the largest hole if this section has the cause. Otherwise it is that
+    /// of the last section with the cause.
     pub fn evidence_of(&self, run: &Run, cause: Cause) -> Option<Evidence> {
         let evidence = |index: i64| self.get(index)?.evidence.filter(|evidence| evidence.causes.has(cause));
         evidence(run.worst.0).or_else(|| (run.from..run.to).rev().find_map(evidence))
     }
 
-    /// Index range of the existing sections that a stretch, such as the coverage extent, touches.
+    /// Returns the index range of the existing sections that a stretch touches.
     pub fn sections_of(&self, stretch: Option<Reach>) -> Range<i64> {
         let Some(reach) = stretch else { return 0..0 };
         let end = self.first + i64::try_from(self.sections.len()).unwrap_or(i64::MAX);
@@ -462,7 +472,7 @@ impl Sections {
 }
 
 impl Sections {
-    /// Unsure stretch of a single section; `None` if the section isn't unsure.
+    /// Returns the unsure stretch of a single section; `None` if the section isn't unsure.
     pub fn unsure(&self, index: i64) -> Option<Stretch> {
         let section = self.get(index)?;
         let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
@@ -471,8 +481,9 @@ impl Sections {
         Some(Stretch::one(section.unsure()?, index, [hole_m, error_m, section.hole_sd_m], driven))
     }
 
-    /// Unsure stretches within a stretch such as the coverage extent, in order. Allocates: for the end of a
-    /// dive.
+    /// Returns the unsure stretches within a stretch such as the coverage extent, in order.
+    ///
+    /// Allocates: for the end of a dive.
     pub fn unsure_stretches(&self, way: Option<Reach>) -> Vec<Stretch> {
         let mut all: Vec<Stretch> = Vec::new();
         for stretch in self.sections_of(way).filter_map(|index| self.unsure(index)) {
@@ -506,7 +517,7 @@ pub(super) fn verdict(hole: &Hole, error_m: f64, target_m: f64, clear_m: f64) ->
     }
 }
 
-/// Chainage `run_up_m` before a stretch begins, m, rounded down to a decimetre.
+/// Returns the chainage `run_up_m` before the start of a stretch, m, rounded down to a decimetre.
 pub fn back_to_m(start_m: f64, run_up_m: f64) -> f64 {
     math::floor_to_i64((start_m - run_up_m) * 10.0 + 1e-6) as f64 / 10.0
 }

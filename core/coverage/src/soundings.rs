@@ -1,12 +1,12 @@
-//! Sounding density: samples per node of a square grid, as survey specifications require.
+//! Sounding density: number of samples per node of a square grid, as survey specifications require.
 //!
-//! A grid does not detect gaps: a helix can satisfy it and leave strips wider than the target. It complements
-//! the hole, and never replaces it. Source: docs/why/coverage.md, "For surveyors".
+//! A grid does not detect all gaps: a helix can satisfy the grid and leave strips wider than the target. The density
+//! complements the hole, and never replaces it. Source: docs/why/coverage.md, "For surveyors".
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 
-/// Minimum samples per node.
+/// Minimum number of samples per node.
 pub const ENOUGH: u16 = 5;
 /// Default node edge, m.
 pub const NODE_M: f64 = 0.5;
@@ -20,11 +20,13 @@ pub struct GridLayout {
     pub from_m: f64,
     /// Last chainage, m.
     pub to_m: f64,
-    /// Node edge along the tunnel, m; around the perimeter it is adjusted to a whole number of nodes.
+    /// Node edge along the tunnel, m.
+    ///
+    /// Around the perimeter, the edge is adjusted to give a whole number of nodes.
     pub node_m: f64,
 }
 
-/// Counts of samples by node.
+/// Number of samples by node.
 #[derive(Debug, Clone)]
 pub struct Soundings {
     layout: GridLayout,
@@ -35,25 +37,25 @@ pub struct Soundings {
 
 stateful!(Soundings { slots: counts; fixed: layout, first_row, columns; });
 
-/// Node counts of a stretch.
+/// Number of nodes of a stretch, by density.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GridSummary {
-    /// Nodes centred in the stretch.
+    /// Number of nodes whose centre is in the stretch.
     pub nodes: u32,
-    /// Nodes with at least [`ENOUGH`] samples.
+    /// Number of nodes with at least [`ENOUGH`] samples.
     pub enough: u32,
-    /// Nodes without any sample (holidays).
+    /// Number of nodes without any sample (holidays).
     pub empty: u32,
 }
 
 /// A node of the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridNode {
-    /// Chainage of its centre, m.
+    /// Chainage of the node's centre, m.
     pub x_m: f64,
-    /// Arc length of its centre, m.
+    /// Arc length of the node's centre, m.
     pub arc_m: f64,
-    /// Samples on it, at most 65,535.
+    /// Number of samples on the node, at most 65,535.
     pub count: u16,
 }
 
@@ -65,7 +67,7 @@ impl GridSummary {
 }
 
 impl Soundings {
-    /// An empty grid.
+    /// Creates an empty grid.
     ///
     /// Allocates: at startup, two bytes per node; the OS maps a page on its first sample.
     pub fn new(layout: GridLayout) -> Self {
@@ -76,12 +78,12 @@ impl Soundings {
         Self { layout, first_row, columns, counts: vec![0; nodes] }
     }
 
-    /// Edges of a node, along the tunnel and round the perimeter, m.
+    /// Returns the edges of a node along the tunnel and around the perimeter, m.
     pub fn node_m(&self) -> [f64; 2] {
         [self.layout.node_m, self.layout.perimeter_m / self.columns as f64]
     }
 
-    /// Counts a sample; false if it lies outside or isn't finite.
+    /// Counts a sample; returns false if the sample lies outside or isn't finite.
     ///
     /// Allocates: never.
     pub fn add(&mut self, x_m: f64, arc_m: f64) -> bool {
@@ -98,12 +100,12 @@ impl Soundings {
         usize::try_from(row * self.columns + math::floor_to_i64(into).min(self.columns - 1)).ok()
     }
 
-    /// Nodes centred in chainages [`from_m`, `to_m`), row by row.
+    /// Returns the nodes with their centre in chainages [`from_m`, `to_m`), row by row.
     ///
     /// Allocates: never.
     pub fn nodes_between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = GridNode> {
         let [along_m, around_m] = self.node_m();
-        // The first row centred at or after a chainage.
+        // Returns the first row whose centre is at or after a chainage.
         let row = |x_m: f64| -math::floor_to_i64(0.5 - x_m / along_m) - self.first_row;
         let last = i64::try_from(self.counts.len()).unwrap_or(0) / self.columns;
         (row(from_m).max(0)..row(to_m).min(last)).flat_map(move |row| {
@@ -118,7 +120,7 @@ impl Soundings {
         })
     }
 
-    /// Summary of the nodes centred in chainages [`from_m`, `to_m`).
+    /// Returns the summary of the nodes with their centre in chainages [`from_m`, `to_m`).
     ///
     /// Allocates: never.
     pub fn summary(&self, from_m: f64, to_m: f64) -> GridSummary {
@@ -131,7 +133,7 @@ impl Soundings {
         summary
     }
 
-    /// Nodes without a sample centred in chainages [`from_m`, `to_m`).
+    /// Returns the nodes without a sample whose centre is in chainages [`from_m`, `to_m`).
     ///
     /// Allocates: never.
     pub fn empty_between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = GridNode> {
@@ -185,7 +187,7 @@ mod tests {
 
         /// Consecutive stretches contain each node exactly once.
         #[test]
-        fn each_node_belongs_to_one_section(section_m in 0.1f64..3.0) {
+        fn consecutive_stretches_contain_each_node_once(section_m in 0.1f64..3.0) {
             let soundings = soundings(&[]);
             let parts: u32 = (0..6)
                 .map(|k| soundings.summary(section_m * f64::from(k), section_m * f64::from(k + 1)).nodes)
@@ -195,9 +197,9 @@ mod tests {
     }
 
     #[test]
-    fn helix_fills_the_grid_but_misses_a_strip() {
-        // Two passes run at the edges of each node's row. Every node has ten samples, yet 0.4 m between them
-        // are unseen.
+    fn full_grid_does_not_exclude_a_missed_strip() {
+        // Two passes run along the edges of each row of nodes. Every node has ten samples, but the strip of 0.4 m
+        // between the passes has none.
         let passes = (0..20).flat_map(|k| [0.05, 0.45].map(|x_m| f64::from(k) * 0.5 + x_m));
         let samples: Vec<_> =
             passes.flat_map(|x_m| (0..73).map(move |i| (x_m, f64::from(i) * 0.1))).collect();
@@ -207,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn outside_samples_are_not_counted_and_counts_saturate() {
+    fn samples_outside_are_not_counted_and_counts_saturate() {
         let mut soundings = soundings(&[]);
         for (x_m, arc_m) in [(-3.3, 0.0), (20.1, 0.0), (f64::NAN, 0.0), (0.0, f64::NAN), (0.0, f64::INFINITY)]
         {

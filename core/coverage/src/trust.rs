@@ -1,4 +1,4 @@
-//! Trust in heads: detects noise, a range that never changes, and wall that other heads don't see.
+//! Trust in heads: detects noise, a range that never changes, and wall that other heads do not see.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,31 +10,31 @@ use headrace_geometry::math;
 /// Reason for distrusting a head, with the figure that shows it, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Distrust {
-    /// Most of its successive returns disagree; their mean difference.
+    /// Most successive returns of the head disagree; the value is their mean difference.
     Scattered(f64),
-    /// Its range doesn't change although the range to the design does; the range.
+    /// The head's range is constant although the range to the design changes; the value is the head's range.
     Constant(f64),
-    /// It contradicts the design where other heads agree with it; its mean deviation there.
+    /// The head contradicts the design where other heads agree with it; the value is the mean deviation.
     Outvoted(f64),
 }
 
-/// The beam that a return came from.
+/// The beam of a return.
 pub struct Beam<'a> {
     /// Range, m.
     pub range_m: f64,
     /// Direction of the beam across the tunnel, rad.
     pub angle_rad: f64,
-    /// The head is not turning.
+    /// Whether the head is not turning.
     pub standing: bool,
-    /// Range to the design profile, m; `None` if the beam doesn't meet it.
+    /// Range to the design profile, m; `None` if the beam doesn't meet the profile.
     pub design_range_m: &'a dyn Fn() -> Option<f64>,
 }
 
-/// Evidence of the vehicle's other heads on one head.
+/// Evidence on one head from the vehicle's other heads.
 pub(super) struct Others {
-    /// Votes on it.
+    /// Votes on the head.
     pub(super) ballot: Ballot,
-    /// Another head's range changes as the design's does.
+    /// Whether another head's range changes as the range to the design does.
     pub(super) change: bool,
 }
 
@@ -43,13 +43,15 @@ pub(super) struct Others {
 struct HalfTurn {
     returns: u32,
     doubtful: u32,
-    /// Returns that disagree with the previous one, and the sum of the differences, m.
+    /// Number of returns that disagree with the previous return, and the sum of the differences, m.
     jumps: u32,
     jump_sum_m: f64,
     turned_rad: f64,
     /// Least and greatest chainage of the returns, m.
     between_m: Option<[f64; 2]>,
-    /// Returns within runs of one range; least and greatest range of these, and of the design there, m.
+    /// Number of returns within runs of constant range.
+    ///
+    /// The next fields are the smallest and largest range of these returns, and of the design there, m.
     unchanged: u32,
     unchanged_m: Option<[f64; 2]>,
     design_m: Option<[f64; 2]>,
@@ -74,7 +76,9 @@ impl HalfTurn {
         self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
     }
 
-    /// Whether more than one return in `parts` has the same range although the design's varies widely there.
+    /// Whether more than one in `parts` returns has a constant range.
+    ///
+    /// The range to the design must vary widely for these returns.
     fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
         let span_m = |of: Option<[f64; 2]>| of.map_or(0.0, |[least_m, most_m]| most_m - least_m);
         parts * self.unchanged > self.returns
@@ -82,27 +86,32 @@ impl HalfTurn {
             && span_m(self.design_m) > VARIES * limits.tolerance_m
     }
 
-    /// Whether more than one return in `parts` disagrees with its neighbours.
+    /// Whether more than one in `parts` returns disagrees with its neighbours.
     fn has_one_in(&self, parts: u32) -> bool {
         parts * self.jumps.max(self.doubtful) > self.returns
     }
 }
 
-/// Minimum returns of half a turn.
+/// Minimum number of returns in half a turn.
 const FEW: u32 = 20;
-/// A range counts as unchanged within this share of the tolerance: some quanta of a profiling sonar.
-const UNCHANGED: f64 = 0.2;
-/// Runs of unchanged range have the same range within this share of the tolerance.
-const CONSTANT: f64 = 0.6;
-/// A constant range contradicts the design if the design's varies by this many tolerances.
-const VARIES: f64 = 2.0;
-/// Successive returns that make a run of unchanged range. A few neighbours on a wall may have nearly the same
-/// range.
-const RUN: u32 = 8;
-/// Design variation, in tolerances, that an exactly constant range contradicts if another head's range
-/// changes.
+/// A range counts as unchanged if it varies by less than this share of the tolerance.
 ///
-/// In a round tunnel the design's range varies if the vehicle is beside its estimated place.
+/// The share corresponds to some quanta of a profiling sonar.
+const UNCHANGED: f64 = 0.2;
+/// Maximum difference between runs of unchanged range that count as one constant range.
+///
+/// The difference is a share of the tolerance.
+const CONSTANT: f64 = 0.6;
+/// Variation of the range to the design that a constant range contradicts, in tolerances.
+const VARIES: f64 = 2.0;
+/// Number of successive returns that make a run of unchanged range.
+///
+/// A few neighbouring returns of a wall may have nearly the same range.
+const RUN: u32 = 8;
+/// Variation of the design's range that an exactly constant range contradicts, in tolerances.
+///
+/// This limit applies if another head's range changes. In a round tunnel, the range to the design varies if the
+/// vehicle is beside its estimated place.
 const STUCK_VARIES: f64 = 1.0;
 
 fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
@@ -112,7 +121,7 @@ fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     }
 }
 
-/// Successive returns of one range.
+/// Successive returns with the same range.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Unchanged {
     returns: u32,
@@ -121,7 +130,7 @@ struct Unchanged {
 }
 
 impl Unchanged {
-    /// Adds a return. True if it is within a run of one range.
+    /// Adds a return; returns true if the return is within a run of unchanged range.
     fn add(&mut self, range_m: f64, limits: &WallLimits) -> bool {
         let [least_m, most_m] = self.range_m;
         let span_m = [least_m.min(range_m), most_m.max(range_m)];
@@ -137,12 +146,14 @@ impl Unchanged {
 /// Trust in one head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct HeadTrust {
-    /// The present half turn, and the two before it.
+    /// The present half turn, and the two half turns before.
     halves: [HalfTurn; 3],
     angle_rad: Option<f64>,
     unchanged: Unchanged,
     one_range: ConstantRange,
-    /// Chainages of the returns with that one range, m, and the angle turned since.
+    /// Chainages of the returns with an exactly constant range, m.
+    ///
+    /// The next field is the angle turned since the first of these returns.
     one_range_at_m: [f64; 2],
     one_range_rad: f64,
     distrusted: Option<Distrust>,
@@ -153,11 +164,12 @@ impl HeadTrust {
         self.distrusted
     }
 
-    /// Adds a return. Returns the reason if the head is distrusted from now on, with the chainages of its
-    /// recent returns.
+    /// Adds a return.
     ///
-    /// The inputs include the difference from the previous return, m, if they disagree, and the returns that
-    /// it made doubtful.
+    /// Returns the reason if the head is distrusted from now on, with the chainages of its recent returns.
+    ///
+    /// `jump_m` is the difference from the previous return, m, if both disagree. `doubtful` is the number of returns
+    /// that this return made doubtful.
     pub(super) fn note(
         &mut self,
         placed: &PlacedReturn,
@@ -167,7 +179,7 @@ impl HeadTrust {
         limits: &WallLimits,
         others: &Others,
     ) -> Option<(Distrust, [f64; 2])> {
-        // A stalled head sees one place only, which may well be off the design.
+        // A stalled head sees only one place, which may well be off the design.
         if beam.standing {
             return None;
         }
@@ -221,8 +233,9 @@ impl HeadTrust {
         Some((why, between_m))
     }
 
-    /// Records a return for the check of a constant range. Half a turn is kept unless it contradicts the
-    /// design.
+    /// Records a return for the check of an exactly constant range.
+    ///
+    /// After half a turn, the record starts again, unless the constant range contradicts the design.
     fn note_range(&mut self, placed: &PlacedReturn, beam: &Beam<'_>, turned_rad: f64, limits: &WallLimits) {
         if self.one_range_rad > math::TAU / 2.0 && !self.is_stuck(limits) {
             self.one_range = ConstantRange::default();
@@ -237,7 +250,7 @@ impl HeadTrust {
         self.one_range_rad += turned_rad;
     }
 
-    /// Whether the last returns have one range although the design's varies.
+    /// Whether the last returns have an exactly constant range although the range to the design varies.
     pub(super) fn is_stuck(&self, limits: &WallLimits) -> bool {
         self.one_range.is_stuck(RUN, STUCK_VARIES * limits.tolerance_m)
     }

@@ -5,26 +5,29 @@ use serde::{Deserialize, Serialize};
 
 use super::passage::{Drive, Passage};
 
-/// Reason for which a section neither passes nor fails although no more samples will come without turning
-/// back.
+/// Reason why a section neither passes nor fails although no more samples will come.
+///
+/// Samples may come again if the vehicle turns back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Unsure {
-    /// The coverage extent begins here, or the vehicle turned back here: not all heads have passed.
+    /// The coverage extent begins, or the vehicle turned back, in the section.
+    ///
+    /// Not all heads have passed the section.
     NotInspected,
-    /// The hole is within its error of the target: position isn't known well enough.
+    /// The hole is within its error of the target, because position errors are too large.
     Position,
-    /// It holds samples of several stretches of navigation.
+    /// The section holds samples of several stretches of navigation.
     SeveralStretches,
     /// More returns are doubtful than were accepted as wall.
     DoubtfulReturns,
-    /// It holds samples of a head that was distrusted soon after.
+    /// The section holds samples of a head that was distrusted soon after.
     DistrustedHead,
-    /// Its samples contradict the design profile.
+    /// The section's samples contradict the design profile.
     ContradictedProfile,
-    /// Its cross-section is implausible for the design.
+    /// The section's cross-section area is implausible for the design.
     OtherSize,
-    /// All of its wall is a declared opening.
+    /// All of the section's wall is a declared opening.
     NoWall,
 }
 
@@ -59,24 +62,26 @@ impl Unsure {
 /// Neighbouring sections that are unsure for the same reason.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stretch {
-    /// Reason.
+    /// Reason of all sections in the stretch.
     pub why: Unsure,
     /// Index of the first section.
     pub from: i64,
-    /// Index after the last.
+    /// Index after the last section.
     pub to: i64,
-    /// Its unsure sections: those in which the hole matters more, and those in which its error does.
+    /// The stretch's unsure sections in two groups.
+    ///
+    /// In the first group, the hole matters more; in the second, the error does.
     of: [Largest; 2],
 }
 
 /// Number of unsure sections, and the figures of the one with the largest hole.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Largest {
-    /// Number of sections.
+    /// Number of unsure sections.
     pub sections: u32,
     /// Largest hole, and its standard deviation, m.
     pub hole_m: [f64; 2],
-    /// Driving figures of that section.
+    /// Driving figures of the section with the largest hole.
     pub driven: Driven,
 }
 
@@ -87,18 +92,19 @@ pub struct Driven {
     pub speed_mps: f64,
     /// Largest speed that meets the target with all heads turning as scheduled, m/s; zero if no speed does.
     pub fits_mps: f64,
-    /// At this speed heads at their scheduled angles pass unevenly: heads apart along the hull are out of
-    /// phase.
+    /// Whether heads at their scheduled angles pass unevenly at this speed.
+    ///
+    /// Heads apart along the hull are then out of phase.
     pub is_uneven: bool,
-    /// Heads were silent, or heard no wall. The speeds are those for all heads.
+    /// Whether heads were silent, or heard no wall; the speeds are those for all heads.
     pub is_short: bool,
 }
 
-/// Ratio of the time between passes to that of evenly spread ones above which passes are uneven.
+/// Ratio of the time between passes to that of evenly spread passes, above which passes are uneven.
 const UNEVEN: f64 = 1.05;
 
 impl Driven {
-    /// Figures of a section's passage.
+    /// Returns the figures of a section's passage.
     pub fn of(passage: &Passage) -> Self {
         let Drive { speed_mps, passes_needed, planned_gap_s, all_gap_s, .. } = passage.drive;
         Self {
@@ -112,11 +118,15 @@ impl Driven {
 
 /// Ratio of error to hole above which the error matters more.
 const MOSTLY_ERROR: f64 = 0.2;
-/// Maximum gap within a stretch, m: a vehicle that repeats one section passes the other, too.
+/// Maximum gap within a stretch, m.
+///
+/// Within this distance, a vehicle that repeats one section also passes the other.
 const JOIN_M: f64 = 2.0;
 
 impl Stretch {
-    /// Stretch of one section: its hole, the error of that hole, and the hole's standard deviation, m.
+    /// Creates the stretch of one section.
+    ///
+    /// The figures are its hole, the error of this hole, and the standard deviation of the hole, m.
     pub fn one(why: Unsure, index: i64, [hole_m, error_m, sd_m]: [f64; 3], driven: Driven) -> Self {
         let section = Largest { sections: 1, hole_m: [hole_m, sd_m], driven };
         let is_error = error_m > MOSTLY_ERROR * hole_m;
@@ -124,28 +134,30 @@ impl Stretch {
         Self { why, from: index, to: index + 1, of }
     }
 
-    /// Number of its sections that are unsure for this reason.
+    /// Number of the stretch's sections that are unsure for this reason.
     pub fn sections(&self) -> u32 {
         self.of.iter().map(|of| of.sections).sum()
     }
 
-    /// Whether the error matters more than the hole in most of its sections.
+    /// Whether the error matters more than the hole in most of the stretch's sections.
     pub fn is_mostly_error(&self) -> bool {
         self.of[1].sections > self.of[0].sections
     }
 
-    /// Evidence for the stretch: the largest hole in the larger group of its sections.
+    /// Returns the figures that represent the stretch.
+    ///
+    /// The figures are those of the largest hole in the larger group of sections.
     pub fn largest(&self) -> &Largest {
         &self.of[usize::from(self.is_mostly_error())]
     }
 
-    /// Whether sections are too far away to belong to it.
+    /// Whether sections are too far away to belong to the stretch.
     pub fn is_beyond(&self, sections: Range<i64>, section_m: f64) -> bool {
         let apart = (sections.start - self.to).max(self.from - sections.end);
         apart as f64 * section_m > JOIN_M + 1e-9
     }
 
-    /// Adds a section. False if it is unsure for another reason, or too far away.
+    /// Adds a section; returns false if it is unsure for another reason, or too far away.
     #[must_use]
     pub fn join(&mut self, other: &Self, section_m: f64) -> bool {
         if self.why != other.why || self.is_beyond(other.from..other.to, section_m) {
@@ -177,7 +189,7 @@ mod tests {
         let mut stretch = one(Unsure::Position, 10, 0.4);
         assert!(stretch.join(&one(Unsure::Position, 11, 0.6), 0.25));
         assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25), "eight sections lie between them");
-        assert!(!stretch.join(&one(Unsure::Position, 21, 0.5), 0.25), "nine");
+        assert!(!stretch.join(&one(Unsure::Position, 21, 0.5), 0.25), "nine sections lie between them");
         assert!(!stretch.is_beyond(20..21, 0.25) && stretch.is_beyond(21..22, 0.25));
         assert!(!stretch.is_beyond(-8..-7, 0.25) && stretch.is_beyond(-9..-8, 0.25));
         assert!(!stretch.join(&one(Unsure::DoubtfulReturns, 12, 0.5), 0.25), "another reason");
@@ -186,10 +198,9 @@ mod tests {
         assert_eq!(*stretch.largest(), largest);
     }
 
-    /// A section about which nearly nothing is known doesn't represent the others, whatever the size of its
-    /// hole.
+    /// A section with a large error does not represent the others, whatever the size of its hole.
     #[test]
-    fn majority_of_a_stretch_represents_it() {
+    fn stretch_is_represented_by_the_majority_of_its_sections() {
         let lost = |section| Stretch::one(Unsure::Position, section, [0.9, 1.4, 0.7], Driven::default());
         let mut stretch = lost(0);
         assert!(stretch.is_mostly_error());

@@ -1,5 +1,6 @@
-//! Visits of a place. The error between passes of one visit is known; passes of different visits may be
-//! further apart.
+//! Visits of a place.
+//!
+//! The error between passes of one visit is known. The error between passes of different visits may be larger.
 //!
 //! A visit ends where the vehicle turns back, and where navigation breaks off.
 
@@ -10,25 +11,27 @@ use headrace_fusion::Fix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 
-/// Maximum age of a sample for the error between passes, and minimum age for that of a much earlier visit.
+/// Limits for the age of a sample: below the first, the error between passes applies.
+///
+/// Above the second limit, the error relative to a much earlier visit applies.
 const SAME_PASS: DurNs = DurNs(20_000_000_000);
 const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 
 /// The visit that a sample belongs to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Visit {
-    /// Number from zero. It never decreases.
+    /// Number of the visit, from zero. The number never decreases.
     pub number: u32,
     /// Number of the stretch of navigation.
     pub tie: u32,
     /// Time of the sample.
     pub at: MonoNs,
-    /// Error relative to the previous pass, and relative to a much earlier visit.
+    /// Error relative to the previous pass, and error relative to a much earlier visit.
     pub errors: [PassError; 2],
 }
 
 impl Visit {
-    /// Visit of a fix at `at`, after the vehicle has turned back `turns` times.
+    /// Creates the visit of a fix at `at`, after the vehicle has turned back `turns` times.
     pub fn of(fix: &Fix, at: MonoNs, turns: u32) -> Self {
         let [pass, long_before] =
             [fix.relative, fix.revisit].map(|relative| PassError { relative, ..PassError::of(fix) });
@@ -40,7 +43,9 @@ impl Visit {
         }
     }
 
-    /// Largest standard deviation of a hole's diameter between samples of now and of `then`, m.
+    /// Largest standard deviation of the diameter of a hole between two visits, m.
+    ///
+    /// One visit is this one; the other has its last sample at the time `then`.
     fn apart_sd_m(&self, then: MonoNs, profile: &Profile) -> f64 {
         let over = (self.at.since(then) + DurNs(-SAME_PASS.0)).as_secs_f64();
         let share = (over / (LONG_BEFORE.0 - SAME_PASS.0) as f64 * 1e9).clamp(0.0, 1.0);
@@ -53,14 +58,15 @@ impl Visit {
 /// The visits of a section: those with samples within T of it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Visits {
-    /// Number of the newest visit, its stretch of navigation, and the time of its last sample; `None` before
-    /// the first.
+    /// Number of the newest visit, its stretch of navigation, and the time of its last sample.
+    ///
+    /// `None` before the first visit.
     newest: Option<(u32, u32, MonoNs)>,
     /// Number of the first visit whose samples count.
     first: u32,
-    /// Samples of several visits count.
+    /// Whether samples of several visits count.
     several: bool,
-    /// The visits belong to several stretches of navigation.
+    /// Whether the visits belong to several stretches of navigation.
     unrelated: bool,
     /// The largest standard deviation of a hole's diameter between samples of different visits, m.
     apart_sd_m: f64,
@@ -77,8 +83,9 @@ impl Visits {
         self.newest = Some((visit.number, visit.tie, visit.at));
     }
 
-    /// Records the error between the passes of an earlier visit, as standard deviation of a hole's diameter,
-    /// m.
+    /// Records the error between the passes of an earlier visit.
+    ///
+    /// The error is the standard deviation of a hole's diameter, m.
     pub(super) fn note_earlier(&mut self, sd_m: f64) {
         self.apart_sd_m = self.apart_sd_m.max(sd_m);
     }
@@ -98,8 +105,9 @@ impl Visits {
         self.several
     }
 
-    /// Whether the relation between the visits is uncertain, so that one may only seem to fill the holes of
-    /// another.
+    /// Whether the relation between the visits is uncertain.
+    ///
+    /// In that case, samples of one visit may only seem to fill the holes of another.
     pub(super) fn are_unrelated(&self) -> bool {
         self.unrelated
     }
@@ -109,8 +117,9 @@ impl Visits {
         (self.first, self.several, self.unrelated, self.apart_sd_m) = (self.newest(), false, false, 0.0);
     }
 
-    /// Standard deviation of a hole among the samples of all visits, m. `pass_sd_m` is that of the newest
-    /// visit.
+    /// Returns the standard deviation of a hole among the samples of all visits, m.
+    ///
+    /// `pass_sd_m` is the standard deviation of the newest visit.
     pub(super) fn sd_m(&self, pass_sd_m: f64) -> f64 {
         if self.several { pass_sd_m.max(self.apart_sd_m) } else { pass_sd_m }
     }
@@ -122,8 +131,9 @@ mod tests {
     use headrace_fusion::relative::Relative;
     use headrace_geometry::tunnel::shapes;
 
-    /// A visit with this number and stretch of navigation. Its passes differ by a centimetre, and by ten from
-    /// those of a much earlier visit.
+    /// Creates a visit with this number and stretch of navigation.
+    ///
+    /// Its passes differ by a centimetre from each other, and by ten centimetres from those of a much earlier visit.
     fn visit(number: u32, tie: u32, at_s: u64) -> Visit {
         let error = |sd_m: f64| PassError { relative: Relative::along(sd_m), from_m: [0.0; 2] };
         Visit { number, tie, at: MonoNs(at_s * 1_000_000_000), errors: [error(0.01), error(0.1)] }
@@ -153,9 +163,9 @@ mod tests {
         assert_eq!((visits.first(), visits.are_several(), visits.are_unrelated()), (4, false, false));
     }
 
-    /// The error between visits grows with the time since the last sample, between 20 s and 40 s.
+    /// The error between visits grows with the time since the earlier visit, between 20 s and 40 s.
     #[test]
-    fn error_between_visits_grows_with_the_time_between() {
+    fn error_between_visits_grows_with_the_time_between_them() {
         let sd_m = |gap_s: u64| after(&[(3, 1, 0), (4, 1, gap_s)]).sd_m(0.0);
         assert!(sd_m(20) > 0.0 && (sd_m(10) - sd_m(20)).abs() < 1e-12, "equal to that of one pass");
         assert!(

@@ -1,11 +1,13 @@
 //! Decides which returns are wall: those near the design, and those that others agree with.
 //!
-//! A return within the tolerance of the design is wall. Another return needs a neighbour along the turn that
-//! is wall, or an earlier pass nearby that found the same deviation from the design. Successive returns that
-//! agree only with one another are a *run*. A run is wall once it is broad for its distance from the design,
-//! or if it ends in a slope to the wall. An isolated return is *doubtful*, and so is a run that hangs in
-//! front of the wall: a fish, a cloud of bubbles, an echo off two walls. A return waits for the head's next
-//! returns before it counts as doubtful, since a boulder begins with one return.
+//! A return within the tolerance of the design is wall. Another return needs a neighbour along the turn that is wall,
+//! or an earlier pass nearby with the same deviation from the design. Successive returns that agree only with one
+//! another are a *run*. A run is wall if it is wide for its distance from the design, or if it ends in a slope to the
+//! wall.
+//!
+//! An isolated return is *doubtful*. So is a run that hangs in front of the wall: a fish, a cloud of bubbles, an echo
+//! off two walls. A return waits for the head's next returns before it counts as doubtful, since a boulder begins
+//! with a single return.
 
 use serde::{Deserialize, Serialize};
 
@@ -29,23 +31,23 @@ pub enum Taken {
     Waits,
 }
 
-/// Decisions made by a return.
+/// Decisions that a return brings about.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sorted {
-    /// Classification of all returns that waited; `None` if there were none, or they keep waiting.
+    /// Classification of all waiting returns; `None` if there are none, or if they still wait.
     pub waiting: Option<Taken>,
     /// Classification of this return.
     pub this: Taken,
-    /// Set when the head becomes distrusted: reason, and the chainages of its recent returns, m.
+    /// Reason if the head becomes distrusted with this return, and the chainages of its recent returns, m.
     pub distrusted: Option<(Distrust, [f64; 2])>,
 }
 
-/// A head's last returns, and whether it is trusted.
+/// The last returns of a head, and the trust in this head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct HeadWall {
     /// The last two returns, latest first, and their classification.
     last: [Option<(PlacedReturn, Taken)>; 2],
-    /// Returns that wait.
+    /// The waiting returns.
     run: Run,
     trust: HeadTrust,
 }
@@ -56,7 +58,9 @@ impl HeadWall {
         self.trust.distrusted()
     }
 
-    /// Classifies the head's next return, and those that waited for it. `beam` describes its beam.
+    /// Classifies the head's next return and the returns that waited for it.
+    ///
+    /// `beam` is the beam of the next return.
     ///
     /// Allocates: never.
     pub fn sort(
@@ -100,8 +104,10 @@ impl HeadWall {
         Sorted { waiting, this, distrusted }
     }
 
-    /// Classification of a return, of those that waited, and their number. `agrees`: it agrees with the last
-    /// one.
+    /// Decides on a return and on the waiting returns.
+    ///
+    /// `agrees` means that the return agrees with the last one. Returns the run of waiting returns, their
+    /// classification and that of the return.
     fn decide(
         &mut self,
         placed: &PlacedReturn,
@@ -119,7 +125,7 @@ impl HeadWall {
         let this = if is_wall || is_broad { Taken::Wall } else { Taken::Waits };
         let waiting = match waited.count() {
             0 => None,
-            // The run ended in a slope to the wall, or is wide enough.
+            // The run ended in a slope to the wall, or it is wide enough.
             _ if is_wall && agrees || is_broad && goes_on => Some(Taken::Wall),
             _ if !goes_on => Some(Taken::Doubtful),
             _ if run.is_full() => Some(Taken::Doubtful),

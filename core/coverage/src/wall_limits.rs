@@ -7,16 +7,17 @@ use headrace_geometry::math;
 /// Limits for accepting returns as wall, m. They scale with the cross-section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallLimits {
-    /// Returns within this distance of the design, or of wall returns that agree with them, are wall.
+    /// Tolerance: returns within this distance of the design, or of neighbouring wall returns, are wall.
     pub tolerance_m: f64,
-    /// Returns farther than this off the design contradict it.
+    /// Deviation from the design above which a return contradicts the design.
     pub contradiction_m: f64,
     /// Perimeter of the design profile.
     pub perimeter_m: f64,
-    /// Radius of a circle of this perimeter.
+    /// Radius of a circle with this perimeter.
     pub radius_m: f64,
-    /// Distance along the tunnel within which an earlier pass counts. It doesn't depend on the target T, so
-    /// samples don't either.
+    /// Distance along the tunnel within which an earlier pass counts.
+    ///
+    /// The distance doesn't depend on the target T, so neither do the samples.
     pub reach_m: f64,
 }
 
@@ -26,7 +27,7 @@ const TOLERANCE_SHARE: f64 = 0.1;
 /// Minimum tolerance, m: three times the resolution and noise of profiling sonars.
 const LEAST_TOLERANCE_M: f64 = 0.03;
 
-/// Reach as a share of the equivalent radius, and its minimum, m: about the distance between passes.
+/// Reach as a share of the equivalent radius, and minimum reach, m: about the distance between passes.
 const REACH_SHARE: f64 = 0.1;
 const LEAST_REACH_M: f64 = 0.2;
 
@@ -51,14 +52,14 @@ impl WallLimits {
         apart_m <= NEAR_SHARE * self.radius_m && (a.off_m - b.off_m).abs() <= self.tolerance_m + slope_m
     }
 
-    /// Distance between two returns across their rays, at the nearer one's range from the centre, m.
+    /// Distance between two returns across their rays, m, at the range of the nearer return from the centre.
     pub(super) fn width_m(&self, a: &PlacedReturn, b: &PlacedReturn) -> f64 {
         let inward = (1.0 + a.off_m.min(b.off_m) / self.radius_m).clamp(0.0, 1.0);
         let around_m = math::wrap_signed(a.arc_m - b.arc_m, self.perimeter_m) * inward;
         math::hypot(a.x_m - b.x_m, around_m)
     }
 
-    /// Distance between the rays of two returns along the wall, at the farther one, m.
+    /// Distance between the rays of two returns along the wall, m, at the farther return.
     fn apart_m(&self, a: &PlacedReturn, b: &PlacedReturn) -> f64 {
         let outward = 1.0 + a.off_m.max(b.off_m).max(0.0) / self.radius_m;
         let around_m = math::wrap_signed(a.arc_m - b.arc_m, self.perimeter_m) * outward;
@@ -66,9 +67,9 @@ impl WallLimits {
     }
 }
 
-/// Slope between two neighbouring beams allowed beyond the tolerance: 45 degrees.
+/// Slope between two neighbouring beams that is allowed in addition to the tolerance: 45 degrees.
 const SLOPE: f64 = 1.0;
-/// Maximum allowance for slope, tolerances.
+/// Maximum allowance for the slope, in tolerances.
 const MOST_SLOPE: f64 = 1.0;
 /// Maximum distance between neighbours as a share of the radius.
 const NEAR_SHARE: f64 = 0.4;

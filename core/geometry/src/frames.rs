@@ -33,7 +33,7 @@ pub enum Body {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {}
 
-/// A displacement or direction in frame `F`, metres (a direction has no unit).
+/// A displacement in frame `F`, metres, or a direction, which has no unit.
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Vec3<F>(pub Vector3<f64>, PhantomData<F>);
@@ -51,12 +51,12 @@ pub struct Rot<To, From>(pub UnitQuaternion<f64>, PhantomData<(To, From)>);
 macro_rules! components {
     ($type:ident) => {
         impl<F> $type<F> {
-            /// From components in metres.
+            /// Creates a vector from components in metres.
             pub fn new(x: f64, y: f64, z: f64) -> Self {
                 Self(Vector3::new(x, y, z), PhantomData)
             }
 
-            /// From a vector in metres, in this frame.
+            /// Creates a point from a vector in metres, in the same frame.
             pub fn of(vector: Vector3<f64>) -> Self {
                 Self(vector, PhantomData)
             }
@@ -99,7 +99,7 @@ components!(Vec3);
 components!(Point3);
 
 impl<F> Vec3<F> {
-    /// Length.
+    /// Length of the vector.
     pub fn norm(&self) -> f64 {
         math::sqrt(self.0.x * self.0.x + self.0.y * self.0.y + self.0.z * self.0.z)
     }
@@ -155,7 +155,7 @@ impl<F> Sub for Point3<F> {
 }
 
 impl<To, From> Rot<To, From> {
-    /// Identity: the frames coincide.
+    /// The identity rotation: the frames coincide.
     pub fn identity() -> Self {
         Self(UnitQuaternion::identity(), PhantomData)
     }
@@ -188,7 +188,7 @@ impl<To, From> Rot<To, From> {
 
     /// Returns roll, pitch and yaw in radians, with pitch in [-pi/2, pi/2].
     ///
-    /// It is the inverse of [`Rot::from_roll_pitch_yaw`].
+    /// The function is the inverse of [`Rot::from_roll_pitch_yaw`].
     pub fn roll_pitch_yaw(&self) -> (f64, f64, f64) {
         let q = self.0.quaternion();
         let (w, x, y, z) = (q.w, q.i, q.j, q.k);
@@ -279,14 +279,14 @@ mod tests {
     }
 
     #[test]
-    fn aft_facing_head_turns_the_other_way() {
+    fn aft_facing_head_rotates_in_the_opposite_sense() {
         let aft = Rot::<Body, Sensor>::from_roll_pitch_yaw(0.0, 0.0, math::PI);
         near(aft * head_direction(0.0), [0.0, 0.0, -1.0]);
         near(aft * head_direction(math::FRAC_PI_2), [0.0, -1.0, 0.0]);
     }
 
     #[test]
-    fn echosounder_looks_along_its_yaw_and_pitch() {
+    fn echosounder_axis_follows_yaw_and_pitch() {
         let ahead = Vec3::<Sensor>::new(1.0, 0.0, 0.0);
         let left = Rot::<Body, Sensor>::from_roll_pitch_yaw(0.0, 0.0, math::FRAC_PI_2);
         near(left * ahead, [0.0, 1.0, 0.0]);
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn roll_pitch_yaw_survives_a_round_trip() {
+    fn roll_pitch_yaw_round_trip_returns_the_angles() {
         for (roll, pitch, yaw) in [(0.1, -0.2, 3.0), (-3.0, 1.5, -1.0), (0.0, 0.0, 0.0)] {
             let (r, p, y) = Rot::<Tunnel, Body>::from_roll_pitch_yaw(roll, pitch, yaw).roll_pitch_yaw();
             assert!((r - roll).abs() < 1e-12 && (p - pitch).abs() < 1e-12 && (y - yaw).abs() < 1e-12);

@@ -1,9 +1,9 @@
 //! The only access to transcendental functions: the `libm` crate.
 //!
-//! Its results are the same on every platform.
+//! The results of `libm` are the same on every platform.
 //!
-//! The standard library's versions call the platform's C library and differ by an ulp between machines, enough for two
-//! replays to diverge. A lint (clippy.toml) bans them.
+//! The standard library calls the platform's C library, whose results differ by an ulp between machines. That is
+//! enough for two replays to diverge. A lint (clippy.toml) bans the standard library's functions.
 
 pub use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -42,7 +42,7 @@ pub fn atan2(y: f64, x: f64) -> f64 {
     libm::atan2(y, x)
 }
 
-/// Square root by the platform's instruction, since IEEE 754 requires correct rounding.
+/// Square root by the platform's instruction, which rounds correctly on every platform (IEEE 754).
 pub fn sqrt(x: f64) -> f64 {
     x.sqrt()
 }
@@ -67,9 +67,10 @@ pub fn erfc(x: f64) -> f64 {
     libm::erfc(x)
 }
 
-/// `value` wrapped to [0, `modulus`). `modulus` must be positive and finite.
+/// Wraps `value` to [0, `modulus`). `modulus` must be positive and finite.
 pub fn wrap(value: f64, modulus: f64) -> f64 {
-    // Nearly all values are off by less than one modulus. These branches give the same bits as the quotient below.
+    // Nearly all values are within one modulus of the interval. For these, the branches give the same bits as the
+    // quotient.
     if (0.0..modulus).contains(&value) {
         // -0.0 becomes 0.0.
         return value + 0.0;
@@ -83,9 +84,9 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
     if r >= modulus || r < 0.0 { 0.0 } else { r }
 }
 
-/// `difference` wrapped to [-`modulus`/2, `modulus`/2), the shorter way round.
+/// Wraps `difference` to [-`modulus`/2, `modulus`/2), the shorter way round.
 pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
-    // As in `wrap`. Near half a modulus rounding decides, so the quotient is used.
+    // The branches are as in `wrap`. Near half a modulus, rounding matters, so the quotient is used.
     let size = difference.abs();
     if size < 0.499 * modulus {
         return difference;
@@ -100,7 +101,7 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
 /// The largest integer not above `x`; saturates, and NaN gives zero.
 #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn floor_to_i64(x: f64) -> i64 {
-    // Avoids a library call, because several calls per sample look up cells and sections.
+    // Avoids a library call, because each sample needs several calls to look up cells and sections.
     let towards_zero = x as i64;
     if towards_zero as f64 > x { towards_zero.saturating_sub(1) } else { towards_zero }
 }
@@ -108,7 +109,9 @@ pub fn floor_to_i64(x: f64) -> i64 {
 /// The nearest integer to `x` (halves to even); saturates, and NaN gives zero.
 #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn round_to_i64(x: f64) -> i64 {
-    /// 2^52: doubles of this size have no fraction, and adding it rounds to integer, halves to even.
+    /// 2^52: doubles of this size have no fraction.
+    ///
+    /// The sum of a value and this constant is thus rounded to an integer, halves to even.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
     let size = x.abs();
     if size < WHOLE { ((size + WHOLE) - WHOLE).copysign(x) as i64 } else { x as i64 }
@@ -118,9 +121,8 @@ pub fn round_to_i64(x: f64) -> i64 {
 mod tests {
     use super::*;
 
-    /// The shortcuts give the same bits as the quotient.
     #[test]
-    fn shortcuts_give_the_same_bits() {
+    fn wrap_shortcuts_give_the_same_bits_as_the_quotient() {
         let by_quotient = |value: f64, modulus: f64| {
             let r = value - modulus * libm::floor(value / modulus);
             if r >= modulus || r < 0.0 { 0.0 } else { r }
@@ -151,7 +153,7 @@ mod tests {
 
     #[test]
     #[expect(clippy::cast_possible_truncation, reason = "as in the functions under test")]
-    fn rounding_equals_the_library() {
+    fn rounding_equals_that_of_libm() {
         let whole = [0.0, 0.5, 1.0, 1.5, 2.5, 4.4e15, 4.6e15, 9.1e15, 9.2e18, 9.3e18, 1e300];
         let about = whole.into_iter().flat_map(|x: f64| [x, x.next_up(), x.next_down()]);
         let special = [f64::NAN, f64::INFINITY, 1e-310];
@@ -162,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn wrap_stays_below_its_modulus() {
+    fn wrapped_value_is_below_the_modulus() {
         for x in [-1e-17, 0.0, 35.9, 35.899_999_999, -36.0, 1e9, -1e-300] {
             let r = wrap(x, 35.9);
             assert!((0.0..35.9).contains(&r), "{x} gave {r}");

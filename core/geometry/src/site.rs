@@ -1,9 +1,9 @@
-//! Site constants: water, gravity and the direction of the tunnel's axis. Recorded with every log.
+//! Site constants: water, gravity and the direction of the tunnel's axis. Every log records them.
 
 /// The site's constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Site {
-    /// Speed of sound in the tunnel's water, m/s. Ranges are rescaled to it.
+    /// Speed of sound in the tunnel's water, m/s. Measured ranges are rescaled to this speed.
     pub sound_speed_mps: f64,
     /// Density of the water, kg/m^3.
     pub density_kgpm3: f64,
@@ -19,8 +19,8 @@ pub struct Site {
 
 /// Speed of sound in fresh water at 0 to 95 degrees Celsius and an absolute pressure, m/s.
 ///
-/// Source: Marczak 1997, J. Acoust. Soc. Am. 102, 2776 (pure water at one atmosphere, within 0.02 m/s); depth adds
-/// 0.0163 m/s per metre, Mackenzie 1981, J. Acoust. Soc. Am. 70, 807.
+/// Source for pure water at one atmosphere, within 0.02 m/s: Marczak 1997, J. Acoust. Soc. Am. 102, 2776.
+/// Source for the effect of depth, 0.0163 m/s per metre: Mackenzie 1981, J. Acoust. Soc. Am. 70, 807.
 pub fn fresh_water_sound_speed_mps(temperature_degc: f64, pressure_pa: f64) -> f64 {
     const COEFFICIENTS: [f64; 6] =
         [1.402_385e3, 5.038_813, -5.799_136e-2, 3.287_156e-4, -1.398_845e-6, 2.787_860e-9];
@@ -59,7 +59,7 @@ impl Site {
         self.surface_pressure_pa + depth_m * self.density_kgpm3 * self.gravity_mps2
     }
 
-    /// Rescales a range that a device computed with `device_mps` to the water's speed of sound, m.
+    /// Rescales a range to the water's speed of sound, m; the device computed it with `device_mps`.
     pub fn rescaled_range_m(&self, range_m: f64, device_mps: f64) -> f64 {
         range_m * (self.sound_speed_mps / device_mps)
     }
@@ -82,8 +82,8 @@ mod tests {
     }
 
     #[test]
-    fn pressure_is_the_weight_of_water_and_air() {
-        // 10 m of sea water at 9.8 m/s^2 under 900 hPa.
+    fn pressure_and_depth_follow_from_the_weight_of_water_and_air() {
+        // The depth is 10 m in sea water at 9.8 m/s^2, under an air pressure of 900 hPa.
         let sea = Site {
             density_kgpm3: 1025.0,
             gravity_mps2: 9.8,
@@ -92,7 +92,7 @@ mod tests {
         };
         assert!((sea.pressure_pa(10.0) - 190_450.0).abs() < 1e-9, "{}", sea.pressure_pa(10.0));
         assert!((sea.depth_m(190_450.0) - 10.0).abs() < 1e-12, "{}", sea.depth_m(190_450.0));
-        // A density change of 2.5 % moves 50 m by 1.2 m.
+        // A density change of 2.5 % changes a depth of 50 m by 1.2 m.
         let deep_pa = 101_325.0 + 50.0 * 999.7 * 9.806_65;
         let salty = Site { density_kgpm3: 1025.0, ..Site::default() };
         assert!((Site::default().depth_m(deep_pa) - 50.0).abs() < 1e-9);

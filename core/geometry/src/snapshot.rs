@@ -35,7 +35,9 @@ pub trait Stateful {
     /// Appends the state to a snapshot.
     fn save(&self, to: &mut Saver);
 
-    /// Restores the state from a snapshot, in the order it was saved. Settings and buffer capacities are unchanged.
+    /// Restores the state from a snapshot, in the order in which it was saved.
+    ///
+    /// Settings and buffer capacities are unchanged.
     ///
     /// Errors: the snapshot does not fit. `self` may then be partly restored and must not be used.
     fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError>;
@@ -45,7 +47,7 @@ pub trait Stateful {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SnapshotError {
-    /// The bytes aren't a snapshot of this loop.
+    /// The bytes are not a snapshot of this loop.
     #[error("restoring {part} from a snapshot: {why}; it is from another vehicle or version, or damaged")]
     Unfit {
         /// Part of the state that was being restored.
@@ -53,7 +55,7 @@ pub enum SnapshotError {
         /// The cause.
         why: String,
     },
-    /// A value that can't be written.
+    /// A value cannot be written.
     #[error("saving {part}: {why}")]
     Unsaved {
         /// Part of the state that was being saved.
@@ -72,7 +74,7 @@ pub struct Saver {
 }
 
 impl Saver {
-    /// Begins a part and writes its name; errors report it.
+    /// Begins a part and writes its name, which later errors report.
     pub fn part(&mut self, name: &'static str) {
         self.part = name;
         self.value(&name);
@@ -97,7 +99,7 @@ impl Saver {
         }
     }
 
-    /// Adds stateful elements without a count, because their number is a setting.
+    /// Adds stateful elements without their number, because the number is a setting.
     pub fn each<'a, T: Stateful + ?Sized + 'a>(&mut self, each: impl Iterator<Item = &'a T>) {
         each.for_each(|one| one.save(self));
     }
@@ -124,7 +126,7 @@ pub struct Restorer<'a> {
 }
 
 impl<'a> Restorer<'a> {
-    /// From the bytes of [`Saver::finish`].
+    /// Creates a reader of the bytes of [`Saver::finish`].
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, part: "the beginning" }
     }
@@ -138,7 +140,7 @@ impl<'a> Restorer<'a> {
         if found == name { Ok(()) } else { Err(self.unfit(format!("part {found:?} is in its place"))) }
     }
 
-    /// Takes a value.
+    /// Reads a value.
     ///
     /// Errors: the next bytes aren't a value of this type.
     pub fn value<T: DeserializeOwned>(&mut self) -> Result<T, SnapshotError> {
@@ -152,7 +154,7 @@ impl<'a> Restorer<'a> {
         Ok(value)
     }
 
-    /// Fills a list, within its capacity if that is enough.
+    /// Reads a list into a `Vec`, without allocation if the capacity suffices.
     ///
     /// Errors: the snapshot is too short, or an element can't be read.
     pub fn list<T: DeserializeOwned>(&mut self, list: &mut Vec<T>) -> Result<(), SnapshotError> {
@@ -168,9 +170,9 @@ impl<'a> Restorer<'a> {
         Ok(())
     }
 
-    /// Fills a slice of fixed length.
+    /// Reads a slice of fixed length.
     ///
-    /// Errors: another length, or an element that can't be read.
+    /// Errors: the snapshot has another length, or an element can't be read.
     pub fn slots<T: DeserializeOwned>(&mut self, slots: &mut [T]) -> Result<(), SnapshotError> {
         let count: usize = self.value()?;
         if count != slots.len() {
@@ -179,7 +181,7 @@ impl<'a> Restorer<'a> {
         slots.iter_mut().try_for_each(|slot| self.value().map(|value| *slot = value))
     }
 
-    /// Restores stateful elements; their number is a setting.
+    /// Restores stateful elements, whose number is a setting.
     ///
     /// Errors: as for each element.
     pub fn each<'t, T: Stateful + ?Sized + 't>(
@@ -189,7 +191,7 @@ impl<'a> Restorer<'a> {
         each.try_for_each(|one| one.restore(self))
     }
 
-    /// Takes raw bytes.
+    /// Reads raw bytes.
     ///
     /// Errors: the snapshot ends early.
     pub fn raw(&mut self) -> Result<&'a [u8], SnapshotError> {
@@ -227,7 +229,7 @@ pub mod array {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::{Serialize, Serializer};
 
-    /// Serializes the array as a list.
+    /// Serialises the array as a list.
     pub fn serialize<S: Serializer, T: Serialize, const N: usize>(
         array: &[T; N],
         to: S,
@@ -235,7 +237,7 @@ pub mod array {
         to.collect_seq(array)
     }
 
-    /// Deserializes a list of `N` elements.
+    /// Deserialises a list of `N` elements.
     pub fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
         from: D,
     ) -> Result<[T; N], D::Error> {
@@ -315,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn state_is_restored_bit_for_bit_and_settings_stay() {
+    fn state_is_restored_bit_for_bit_and_settings_are_unchanged() {
         let bytes = saved(&machine("a", &[1, 2, 3]));
         let mut other = machine("b", &[]);
         (other.turned, other.places) = (0.0, [None; 40]);
@@ -328,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn foreign_snapshot_is_rejected_with_the_part_named() {
+    fn error_of_a_foreign_snapshot_names_the_part() {
         let bytes = saved(&machine("a", &[1, 2, 3]));
         let mut from = Restorer::new(&bytes);
         from.part("machine").unwrap();

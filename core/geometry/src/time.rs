@@ -1,7 +1,7 @@
 //! Time as integer nanoseconds, in three types that can't be mixed up.
 //!
-//! The loop uses only [`MonoNs`], the host's monotonic clock. The thread that received the bytes, a log or a
-//! simulation sets it. UTC appears at the edges only.
+//! The loop uses only [`MonoNs`], the host's monotonic clock. The timestamp comes from the thread that received the
+//! bytes, from a log or from a simulation. UTC appears only at the program's edges.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ const NS_PER_S: f64 = 1e9;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct MonoNs(pub u64);
 
-/// A UTC timestamp, in nanoseconds since 1970-01-01 (negative before). Used at the edges only.
+/// A UTC timestamp, in nanoseconds since 1970-01-01 (negative before). Only the program's edges use it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct UtcNs(pub i64);
 
@@ -25,18 +25,20 @@ impl DurNs {
     /// Zero duration.
     pub const ZERO: Self = Self(0);
 
-    /// Whole milliseconds; saturates beyond 292 years.
+    /// Creates a duration of whole milliseconds; saturates beyond 292 years.
     pub const fn from_millis(millis: i64) -> Self {
         Self(millis.saturating_mul(1_000_000))
     }
 
-    /// Seconds rounded to the nearest nanosecond; NaN gives zero, and values beyond 292 years saturate.
+    /// Creates a duration from seconds, rounded to the nearest nanosecond.
+    ///
+    /// NaN gives zero, and values beyond 292 years saturate.
     #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
     pub fn from_secs_f64(seconds: f64) -> Self {
         Self(libm::rint(seconds * NS_PER_S) as i64)
     }
 
-    /// Duration in seconds, for use at a model's interface; elsewhere durations stay integers.
+    /// Duration in seconds, for numerical models. All other code keeps durations as integers.
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / NS_PER_S
     }
@@ -49,7 +51,9 @@ impl MonoNs {
         DurNs(i64::try_from(span).unwrap_or(if span < 0 { i64::MIN } else { i64::MAX }))
     }
 
-    /// Timestamp in seconds since the clock's origin; for reports, never for differences.
+    /// Timestamp in seconds since the clock's origin, for reports.
+    ///
+    /// Differences are computed with [`Self::since`].
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / NS_PER_S
     }
@@ -58,7 +62,7 @@ impl MonoNs {
 impl Add<DurNs> for MonoNs {
     type Output = Self;
 
-    /// Saturates at both ends of the clock's range.
+    /// The sum saturates at both ends of the clock's range.
     fn add(self, span: DurNs) -> Self {
         Self(self.0.saturating_add_signed(span.0))
     }
@@ -117,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn ten_hours_of_steps_sum_exactly() {
+    fn steps_over_10_hours_sum_exactly() {
         let step = DurNs::from_secs_f64(0.0048);
         let mut now = MonoNs(0);
         for _ in 0..7_500_000 {

@@ -28,12 +28,12 @@ pub use hysteresis::Hysteresis;
 pub use ring_cache::Looks;
 pub use search::SPEED_MARGIN;
 
-/// Maximum number of modes per head with alternatives.
+/// Maximum number of modes per head for which alternatives are computed.
 pub const MAX_MODES: usize = 8;
 
 /// Number of advice updates per recomputation of the alternatives.
 const ALTERNATIVES_EVERY: u32 = 25;
-/// Number of times that a speed and its position margin are computed from each other.
+/// Number of iterations between a speed and the position margin at that speed.
 const FALLS: u32 = 3;
 /// Speed below which the last direction of travel is kept, m/s.
 const UNDER_WAY_MPS: f64 = 0.02;
@@ -55,7 +55,7 @@ struct Fastest {
 pub struct Task {
     /// Target T, m.
     pub target_m: f64,
-    /// Standard deviations of a hole that a verdict of pass keeps below the target.
+    /// Number of standard deviations of a hole's size by which a passed section stays below the target.
     pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
@@ -74,7 +74,7 @@ pub struct Advisor {
     task: Task,
     heads: Vec<AdvisedHead>,
     views: Vec<View>,
-    /// Strips of the wall with the heads as set now, and in each of their modes.
+    /// Strips of the wall with the heads in their present settings, and in each of their modes.
     now: Strips,
     modes: Strips,
     /// Largest step in each mode at the centre of the tunnel, m.
@@ -84,13 +84,13 @@ pub struct Advisor {
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring is checked first.
     next: usize,
-    /// Remaining advice updates until the alternatives are recomputed, and the current alternatives.
+    /// Number of advice updates until the alternatives are recomputed, and the current alternatives.
     until_alternatives: u32,
     alternatives: [Option<Alternative>; MAX_MODES],
     anew: Option<Anew>,
     margins: Option<Margins>,
     astern: bool,
-    /// Largest speed found last.
+    /// Largest speed found by the last update.
     last_mps: Option<f64>,
     /// Distance that the vehicle may move before rings are recast, m.
     still_m: f64,
@@ -99,7 +99,7 @@ pub struct Advisor {
 stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, anew, margins, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m; });
 
 impl Advisor {
-    /// Creates it for heads with their modes, and for parts of the hull that may occlude them.
+    /// Creates an advisor for heads with their modes, and for parts of the hull that may occlude the heads.
     ///
     /// Allocates: startup only.
     pub fn new(
@@ -151,7 +151,7 @@ impl Advisor {
         advisor
     }
 
-    /// A first cast allocates the buffers of later casts; the rings are then marked as outdated.
+    /// Casts all rings from the centre, so that later casts don't allocate, and marks the rings as outdated.
     fn look_from_the_middle(&mut self) {
         let [y, z] = self.profile.reference();
         let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
@@ -173,7 +173,7 @@ impl Advisor {
         self.astern
     }
 
-    /// Angles that the vehicle hides from each head, in its sensor frame.
+    /// Angles that the vehicle hides from each head, in that head's sensor frame.
     pub fn hidden_angles(&self) -> impl Iterator<Item = &[AngleRange]> {
         self.heads.iter().map(|head| head.hidden.as_slice())
     }
@@ -185,9 +185,9 @@ impl Advisor {
 
     /// Returns the largest speed at which the predicted T_max stays within the target.
     ///
-    /// It inverts Eq. 16 with measured values. These are the turn period, step, number and phases of the heads
-    /// (propagated to that speed), the wall hidden by the vehicle or out of reach, position, attitude and swing.
-    /// `left_s` is the remaining time, if known.
+    /// The function inverts Eq. 16 with measured values: the turn period, step, number and phases of the heads, the
+    /// wall hidden by the vehicle or out of reach, position, attitude and swing. It propagates the phases to each
+    /// tested speed. `left_s` is the remaining time, if known.
     ///
     /// Heads apart along the hull keep their phases only in some intervals of speed. The result is the upper end of
     /// the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
@@ -321,7 +321,7 @@ impl Advisor {
         self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
     }
 
-    /// Returns the inputs that decide whether a speed meets a target with the present phases.
+    /// Returns the inputs of the decision whether a speed meets a target with the present phases.
     fn driving<'a>(
         &'a self,
         phasing: &'a Phasing,
@@ -343,9 +343,9 @@ impl Advisor {
         }
     }
 
-    /// Returns the largest speed at which the present phases meet a target, and the speed to advise.
+    /// Returns the largest speed at which the present phases meet a target, and the advised speed.
     ///
-    /// Errors: no speed meets it, in any phase.
+    /// Errors: no speed meets the target in any phase.
     fn fastest(
         &self,
         phasing: &Phasing,
@@ -358,7 +358,7 @@ impl Advisor {
         let driving = self.driving(phasing, passes, going, sure);
         let t_y_m = match &bound {
             Ok(bound) => bound.t_y_m,
-            // At another speed, heads are phased differently, and the swing between them is smaller.
+            // The heads have other phases at another speed, and the swing between them is smaller.
             Err(SamplingError::OffAxis { .. }) => self.now.largest_step_m(0),
             Err(why) => return Err(*why),
         };
@@ -378,7 +378,7 @@ impl Advisor {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
             // A swing too wide for any speed is also too wide at a slightly different position.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
-            // Any step may be the limiting one.
+            // The limiting step is unknown.
             Err(_) => (self.task.target_m, 0.0),
         };
         ring_cache::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
@@ -386,7 +386,7 @@ impl Advisor {
 
     /// Computes the largest speed in each mode common to all heads, and the cost of each margin.
     ///
-    /// It assumes that the heads turning now are started in phase.
+    /// The computation assumes that the turning heads are restarted in phase.
     fn think_over(
         &mut self,
         phasing: &Phasing,
@@ -414,7 +414,7 @@ impl Advisor {
             };
             let v_max_mps = v_mps * (1.0 - SPEED_MARGIN);
             *slot = Some(Alternative { mode: ModeName::new(mode.name), v_max_mps });
-            // In the present mode, only the start of the heads would change.
+            // A restart in the present mode changes only the phases of the heads.
             if v_max_mps > 0.0 && phasing.fits_some_speeds() && self.is_now(mode, passes) {
                 anew = Some(Anew { planned_speed_mps: v_max_mps });
             }
@@ -423,7 +423,7 @@ impl Advisor {
         self.margins = Some(self.margins(phasing, passes, going, sure));
     }
 
-    /// Whether the heads turn in this mode.
+    /// Whether the heads presently turn in this mode.
     fn is_now(&self, mode: &HeadMode, passes: &Passes) -> bool {
         const SAME: f64 = 0.02;
         let stride = self.strides.iter().flatten().next().copied();
@@ -432,7 +432,7 @@ impl Advisor {
             && (passes.turn_s() - period_s).abs() < SAME * period_s
     }
 
-    /// Returns the largest speeds with margins added one after the other.
+    /// Returns the largest speeds as the margins are added one after the other.
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: RemainingTarget) -> Margins {
         let target_m = self.task.target_m;
         let known = RemainingTarget { pass_error_m: 0.0, ..sure };
@@ -468,7 +468,7 @@ impl Advisor {
 
     /// Largest speed in a mode, m/s.
     ///
-    /// Zero if none meets the target, `None` if a head does not have the mode.
+    /// Zero if no speed meets the target; `None` if a head does not have the mode.
     fn mode_speed_mps(
         &self,
         number: usize,
@@ -484,7 +484,7 @@ impl Advisor {
             ping_period_s = ping_period_s.max(turn(head)?.ping_period_s());
         }
         let passes = match self.task.layout {
-            // Sectors keep their size, whatever number of heads remains.
+            // The size of a sector does not depend on the number of remaining heads.
             HeadLayout::SectorOffset => {
                 Passes::in_sectors(heads, 2.0 * longest_s / self.heads.len().max(1) as f64)
             }
@@ -501,11 +501,11 @@ impl Advisor {
                 .bound_for_target(number, &passes, target_m, &going)
                 .map_or(0.0, |bound| bound.speed_mps)
         };
-        // Each speed has a larger position margin than the faster one before, so the iteration converges downwards.
+        // Each speed has a larger position margin than the faster one before, so the speeds converge from above.
         Some((0..FALLS).fold(bound_mps(sure.most_m()), |speed_mps, _| bound_mps(sure.at_m(speed_mps))))
     }
 
-    /// Returns the target less position errors, for the heads as they turn now.
+    /// Returns the target less the margin for position errors, for the present motion of the heads.
     fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> RemainingTarget {
         let (even_gap_s, apart_m) = (passes.even_gap_s(), phasing.apart_m());
         RemainingTarget {
@@ -519,14 +519,15 @@ impl Advisor {
         }
     }
 
-    /// The same with the steps of another mode.
+    /// Returns the target less the margin for position errors, with the steps of another mode.
     fn sure_in(&self, mode: usize, sure: RemainingTarget) -> RemainingTarget {
         RemainingTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }
 
-    /// Returns the remedy that is enough by itself.
+    /// Returns the first remedy that is enough by itself.
     ///
-    /// A steady heading comes first, then the centre, if its steps are short enough, then the fastest mode.
+    /// The order is: a steady heading, then the tunnel's centre if the steps are short enough there, then the fastest
+    /// mode.
     fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
         let target_m = self.task.target_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };

@@ -2,7 +2,7 @@
 
 use super::head_set::MAX_HEADS;
 
-/// Reason for a missing result.
+/// Reason for a missing result of sampling theory.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SamplingError {
@@ -11,7 +11,7 @@ pub enum SamplingError {
     NotPositive {
         /// The quantity, with its unit.
         what: &'static str,
-        /// Its value.
+        /// The value of the quantity.
         value: f64,
     },
     /// A quantity that must not be negative is negative or not finite.
@@ -19,7 +19,7 @@ pub enum SamplingError {
     Negative {
         /// The quantity, with its unit.
         what: &'static str,
-        /// Its value.
+        /// The value of the quantity.
         value: f64,
     },
     /// The step does not divide a turn.
@@ -27,7 +27,7 @@ pub enum SamplingError {
     StepDoesNotDivide {
         /// The step, degrees.
         step_deg: f64,
-        /// Steps to a turn.
+        /// Number of steps per turn.
         steps: f64,
     },
     /// A beam at or beyond 90 degrees from the perpendicular to a flat wall.
@@ -55,7 +55,7 @@ pub enum SamplingError {
         /// Above the floor's centre, m.
         z_m: f64,
     },
-    /// Sectors for fewer than two heads.
+    /// Sectors are impossible with fewer than two heads.
     #[error("sector offset divides a turn among heads: it needs at least 2, not {heads}")]
     SectorNeedsHeads {
         /// Number of heads.
@@ -70,7 +70,7 @@ pub enum SamplingError {
     /// The heads have no common mode.
     #[error("the heads have no mode in common, or none at all")]
     NoCommonMode,
-    /// A plan without a target, speed or time.
+    /// A planning question has no target, speed or time.
     #[error("no question: give a target, a speed or a time")]
     NothingAsked,
     /// Heads apart along the hull have no phase for a stationary vehicle.
@@ -92,7 +92,7 @@ pub enum SamplingError {
         target_m: f64,
         /// Width of the strip, m.
         width_m: f64,
-        /// Its middle, arc length in m.
+        /// Arc length of the strip's middle, m.
         arc_m: f64,
     },
     /// The vehicle's heading is too far off the axis, or it swings too fast.
@@ -114,9 +114,9 @@ pub enum SamplingError {
 }
 
 impl SamplingError {
-    /// Returns the error for the configured target, m.
+    /// Returns the error with the configured target, m.
     ///
-    /// A smaller target was tried, to leave a margin for errors.
+    /// A smaller target was tried, to leave a margin for position errors.
     #[must_use]
     pub(crate) fn of_target(mut self, asked_m: f64) -> Self {
         if let Self::UnseenStrip { target_m, .. }

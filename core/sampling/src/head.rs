@@ -6,15 +6,17 @@ use headrace_geometry::frames::{Body, Mount, Rot, Sensor, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
 
-/// A head without a return for this long is silent: it is neither waited for nor counted in the advice.
+/// A head without a return for this long counts as silent.
+///
+/// The program does not wait for a silent head, and does not use it in the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
-/// Tolerance on a whole number of steps per turn: steps come from decimal degrees.
+/// Tolerance for a whole number of steps per turn, because steps are specified in decimal degrees.
 const WHOLE_STEPS: f64 = 1e-6;
 /// Maximum number of steps per turn.
 const MAX_STEPS: f64 = 100_000.0;
 
-/// Rotation of a head: equal steps, a ping at each, a whole number of steps per turn.
+/// Rotation of a head in a whole number of equal steps per turn, with a ping at each step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turn {
     step_rad: f64,
@@ -50,7 +52,7 @@ impl Turn {
         self.period_s
     }
 
-    /// n: pings to a turn. Source: Eq. 3.
+    /// n: pings per turn. Source: Eq. 3.
     pub fn steps(&self) -> u32 {
         self.steps
     }
@@ -66,7 +68,7 @@ impl Turn {
     }
 }
 
-/// Source of a mode's turn period.
+/// Source of the turn period of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
     /// Measured on this head at this range setting, from the vehicle file.
@@ -91,7 +93,7 @@ impl Basis {
 /// A rotation mode of a head, at its range setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadMode {
-    /// Its name in vehicle files.
+    /// Name of the mode in vehicle files.
     pub name: &'static str,
     /// Step and period.
     pub turn: Turn,
@@ -99,7 +101,7 @@ pub struct HeadMode {
     pub basis: Basis,
 }
 
-/// The body of a head, a cylinder about its axis, which may occlude neighbouring heads.
+/// The body of a head: a cylinder around the head's axis, which may occlude neighbouring heads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadBody {
     /// Radius, m; zero for a head without a body.
@@ -110,7 +112,7 @@ pub struct HeadBody {
     pub behind_m: f64,
 }
 
-/// Properties of a head needed for its schedule.
+/// Properties of a head that its schedule requires.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadSpec {
     /// Mounting on the vehicle.
@@ -119,18 +121,18 @@ pub struct HeadSpec {
     pub step_rad: f64,
     /// Time between two pings, seconds.
     pub ping_period_s: f64,
-    /// Smallest and largest range at its setting, m, as computed with `sound_speed_mps`.
+    /// Smallest and largest range at the head's range setting, m, as computed with `sound_speed_mps`.
     pub range_m: [f64; 2],
     /// Speed of sound with which the head computes ranges, m/s.
     pub sound_speed_mps: f64,
-    /// zeta: full width of its beam, radians.
+    /// zeta: full width of the beam, radians.
     pub beam_rad: f64,
-    /// Its body.
+    /// Body of the head.
     pub body: HeadBody,
 }
 
 impl HeadSpec {
-    /// Smallest and largest range to a wall that it detects in water with this speed of sound, m.
+    /// Smallest and largest detectable range to a wall in water with this speed of sound, m.
     pub fn reach_m(&self, sound_speed_mps: f64) -> [f64; 2] {
         self.range_m.map(|range_m| range_m * sound_speed_mps / self.sound_speed_mps)
     }
@@ -143,7 +145,7 @@ pub struct HeadProgram {
     pub start_rad: f64,
     /// Whether the first step is towards growing angles.
     pub growing: bool,
-    /// Sector to sweep back and forth in (least angle, size), radians; `None` for continuous rotation.
+    /// Least angle and size of the sector to sweep back and forth, radians; `None` for continuous rotation.
     pub sector: Option<(f64, f64)>,
 }
 
@@ -158,7 +160,7 @@ pub struct HeadMotion {
     pub rate_radps: f64,
     /// Angle between two pings, radians, positive.
     pub step_rad: f64,
-    /// Size of the sector between its last turning points, radians; `None` for continuous rotation.
+    /// Size of the sector between the last two turning points, radians; `None` for continuous rotation.
     pub sector_rad: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Interference: how long two heads can hear each other, directly or by the same patch of wall.
+//! Interference: time for which two heads can hear each other, directly or from the same patch of wall.
 
 use super::error::SamplingError;
 use super::head::HeadSpec;
@@ -14,9 +14,9 @@ use headrace_geometry::tunnel::Profile;
 pub struct Exposure {
     /// The two heads by number.
     pub heads: (usize, usize),
-    /// Each beam points at the other head's body, seconds per turn.
+    /// Time for which each beam points at the other head's body, seconds per turn.
     pub facing_s: f64,
-    /// The beams' footprints on the wall overlap, seconds per turn.
+    /// Time for which the beams' footprints on the wall overlap, seconds per turn.
     pub same_patch_s: f64,
     /// Period of the turn, or of the sweep there and back, seconds.
     pub of_s: f64,
@@ -24,7 +24,7 @@ pub struct Exposure {
 
 /// Returns the exposure of each pair of heads that follow a schedule, with the vehicle at `pose`.
 ///
-/// Pairs without exposure are omitted. Heads at the same position are idealised and have none.
+/// Pairs without exposure are omitted. Heads at the same position are an idealisation and have no exposure.
 /// Errors: a head outside the profile, or a beam along the tunnel.
 pub fn exposures(
     heads: &[HeadSpec],
@@ -131,7 +131,7 @@ mod tests {
     fn side_by_side_heads_half_a_turn_apart_face_each_other() {
         let found = found(&[[0.0, 0.15, 0.0], [0.0, -0.15, 0.0]], HeadLayout::PhaseShift);
         assert_eq!(found.len(), 1);
-        // Each looks at the other once per turn of 8 s, for 2 (0.7 + asin(0.04 / 0.3)) degrees = 16.7.
+        // Each beam points at the other head once per turn of 8 s, for 2 (0.7 + asin(0.04 / 0.3)) degrees = 16.7.
         assert!((found[0].facing_s - 8.0 * 16.73 / 360.0).abs() < 0.025, "{:?}", found[0]);
         assert_eq!((found[0].same_patch_s, found[0].of_s), (0.0, 8.0));
     }
@@ -156,10 +156,11 @@ mod tests {
             let found = found(&[[apart_m, 0.0, 0.0], [0.0, 0.0, 0.1]], HeadLayout::PhaseShift);
             found.iter().map(|exposure| exposure.same_patch_s).sum::<f64>()
         };
-        // At 0.2 m/s and 8 s per turn, the vehicle travels 0.8 m in half a turn. That far apart, footprints never overlap.
+        // At 0.2 m/s and 8 s per turn, the vehicle travels 0.8 m in half a turn. The footprints of heads 0.8 m apart
+        // never overlap.
         assert!(shared(0.8) <= 0.0);
-        // A beam is 0.15 m wide at 6 m, and wider on the floor. Heads 0.1 m apart are near enough, but their angles are
-        // half a turn apart.
+        // A beam is 0.15 m wide at 6 m, and wider on the floor. Heads 0.1 m apart are near enough, but their angles
+        // differ by half a turn.
         assert!(shared(0.1) <= 0.0);
         let heads = heads(&[[0.1, 0.0, 0.0], [0.0, 0.0, 0.1]]);
         let profile = shapes::ceran().unwrap();

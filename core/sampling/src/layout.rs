@@ -7,18 +7,18 @@ use headrace_geometry::math::{self, TAU};
 /// Layout of the heads of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeadLayout {
-    /// All rotate continuously, 2 pi / s apart where they pass the same place.
+    /// All heads rotate continuously, 2 pi / s apart where they pass the same place.
     PhaseShift,
-    /// Each sweeps back and forth in a sector of 2 pi / s.
+    /// Each head sweeps back and forth in a sector of 2 pi / s.
     SectorOffset,
 }
 
 impl HeadLayout {
-    /// The layouts by their names in files and on command lines.
+    /// Names of the layouts in files and on command lines.
     pub const NAMES: [(&'static str, Self); 2] =
         [("phase_shift", Self::PhaseShift), ("sector_offset", Self::SectorOffset)];
 
-    /// Its name.
+    /// Name of the layout.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::PhaseShift => "phase_shift",
@@ -28,7 +28,7 @@ impl HeadLayout {
 
     /// Checks whether this number of heads can have this layout.
     ///
-    /// Errors: no head, more than [`MAX_HEADS`], or sectors for fewer than two.
+    /// Errors: no head, more than [`MAX_HEADS`], or sectors for fewer than two heads.
     pub fn check(self, heads: usize) -> Result<(), SamplingError> {
         match (self, heads) {
             (_, 0) => Err(SamplingError::HeadCount { heads }),
@@ -55,7 +55,8 @@ pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64,
 
 /// gamma: start angle of a head `x_m` behind the foremost one, in [0, 2 pi).
 ///
-/// Its phase is `phase_rad` where it passes the same place. Accurate to about 1e-16 of the angle turned meanwhile.
+/// The head has the phase `phase_rad` where it passes the foremost head's place. The error is about 1e-16 of the
+/// angle turned between the two passes.
 ///
 /// Errors: as for [`turned_over_rad`]; a phase that isn't finite.
 /// Source: Jorge et al. 2021, Eq. 20 (gamma = phi(k) - omega x / v).
@@ -64,7 +65,9 @@ pub fn start_rad(phase_rad: f64, rate_radps: f64, x_m: f64, speed_mps: f64) -> R
     Ok(math::wrap(phase_rad - turned_over_rad(rate_radps, x_m, speed_mps)?, TAU))
 }
 
-/// gamma of a head that faces the other way, whose angles grow opposite to the first's; in [0, 2 pi).
+/// gamma of a head that faces the other way, in [0, 2 pi).
+///
+/// The angles of this head grow in the opposite sense to those of the foremost head.
 ///
 /// Errors: as for [`start_rad`].
 /// Source: Jorge et al. 2021, Eq. 21 (gamma = 2 pi - (phi(k) - omega x / v)).
@@ -80,12 +83,12 @@ pub fn start_reversed_rad(
 /// Angles closer together than this are equal, radians.
 const ROUNDING_RAD: f64 = 1e-9;
 
-/// Number of steps to cover `far_rad`; the last one is shorter if they do not divide it.
+/// Number of steps to cover `far_rad`; the last step is shorter if the steps do not divide `far_rad`.
 pub(super) fn steps_over(far_rad: f64, step_rad: f64) -> i64 {
     -math::floor_to_i64(-(far_rad / step_rad - 1e-6))
 }
 
-/// Position of a head in its sweep, and its direction. Angles in the sensor frame.
+/// Angle and direction of a head in its sweep, in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InSector {
     /// Head angle, radians, in [0, 2 pi).
@@ -94,25 +97,25 @@ pub struct InSector {
     pub growing: bool,
 }
 
-/// A head's share of a turn divided among several.
+/// The share of a turn that one of several heads sweeps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sector {
     /// Sector number, from zero at the floor.
     pub number: usize,
     /// Number of sectors.
     pub of: usize,
-    /// Distance of the head behind the first, m.
+    /// Distance of the head behind the first head, m.
     pub behind_m: f64,
-    /// Whether it faces opposite to the first.
+    /// Whether the head faces opposite to the first head.
     pub reversed: bool,
 }
 
-/// Returns the angle at which a head is in step with the first one.
+/// Returns the angle at which a head is in step with the first head.
 ///
-/// Both are at the same point of their sweep where they pass the same place. The first head, in sector 0, is at
-/// `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s. A `speed_mps` of zero
-/// means no delay: heads move in step, at right angles for four of them, regardless of their positions along the
-/// hull.
+/// Two heads are in step if they are at the same point of their sweeps where they pass the same place. The first
+/// head, in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s.
+/// A `speed_mps` of zero means no delay: all heads are at the same point of their sweeps, regardless of their
+/// positions along the hull.
 /// Errors: fewer than two sectors, a number that isn't one of them, a lead outside sector 0, a time that isn't above
 /// zero, a speed below zero.
 /// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.
@@ -137,7 +140,7 @@ pub fn in_step(
         "what is left of the first head's sector in radians",
         size_rad - lead.angle_rad + ROUNDING_RAD,
     )?;
-    // Sweep unfolded: 0 to 1 on the way out, 1 to 2 on the way back.
+    // Point in the sweep, unfolded: 0 to 1 on the way out, 1 to 2 on the way back.
     let share = (lead.angle_rad / size_rad).min(1.0);
     let lead_legs = if lead.growing { share } else { 2.0 - share };
     let legs = math::wrap(lead_legs - delay_s / sweep_s, 2.0);
@@ -150,8 +153,8 @@ pub fn in_step(
 
 /// Assigns a sector to each head such that heads look outwards, away from their neighbours.
 ///
-/// It maximises the sum over heads of the offset across the hull times the direction of the sector's middle. Among
-/// equal assignments it prefers head k in sector k.
+/// The assignment maximises the sum over heads of the offset across the hull times the direction of the sector's
+/// middle. Among equal assignments, the function prefers head k in sector k.
 pub fn sectors(heads: &[HeadSpec]) -> Vec<usize> {
     let count = heads.len().min(MAX_HEADS);
     let share = TAU / count.max(1) as f64;
@@ -166,7 +169,9 @@ pub fn sectors(heads: &[HeadSpec]) -> Vec<usize> {
     best.1
 }
 
-/// Tries the remaining sectors for the next head, in order, so that the first of equals wins.
+/// Tries the remaining sectors for the next head, in order.
+///
+/// The first of several equal assignments is kept.
 fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f64, Vec<usize>)) {
     /// Gains closer together than this are equal, m.
     const SAME_M: f64 = 1e-9;
@@ -221,7 +226,7 @@ pub fn programs(
 
 /// Program for continuous rotation.
 ///
-/// All heads turn in the same sense in the body frame, so one that faces aft steps downwards in its sensor frame.
+/// All heads turn in the same sense in the body frame, so a head that faces aft steps downwards in its sensor frame.
 fn phase_shift(
     head: &HeadSpec,
     phase_rad: f64,
@@ -246,7 +251,7 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     let least_rad = if sector.reversed { math::wrap(TAU - least_rad - size_rad, TAU) } else { least_rad };
     let begin = InSector { angle_rad: 0.0, growing: true };
     let start = in_step(begin, sector, turn_s, speed_mps)?;
-    // Either end may have been wrapped by a whole turn.
+    // The wrapping may have moved either end by a whole turn.
     let along_rad = math::wrap(start.angle_rad - least_rad + ROUNDING_RAD, TAU) - ROUNDING_RAD;
     Ok(HeadProgram {
         start_rad: least_rad + along_rad,
@@ -255,13 +260,13 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// Spacing rule for heads apart along the hull, started at multiples of 1/s turn from each other.
+/// Spacing rule for heads apart along the hull, with starts that differ by multiples of 1/s turn.
 ///
-/// It relates distance, speed and turn period such that their passes interleave. At these angles heads interfere
-/// least.
+/// The rule relates distance, speed and turn period such that the heads' passes interleave. Heads with these start
+/// angles interfere least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HullRule {
-    /// q: s-ths of a turn in which the vehicle travels the distance, to the nearest.
+    /// q: number of s-ths of a turn in which the vehicle travels the distance, rounded to the nearest.
     pub q: u32,
     /// The speed that fits the rule, m/s: s x / (q T).
     pub speed_mps: f64,
@@ -271,7 +276,7 @@ pub struct HullRule {
     pub turn_s: f64,
 }
 
-/// The spacing rule for a head `apart_m` behind the first, of `heads` in phase shift.
+/// Returns the spacing rule for a head `apart_m` behind the first, of `heads` heads in phase shift.
 ///
 /// Errors: an argument that isn't above zero, or an invalid number of heads.
 /// Source: Jorge et al. 2021, §5.1 (x = q v T; T = s x / (q v), which is the same rule for s-ths of a turn).
@@ -290,11 +295,11 @@ pub fn hull_rule(apart_m: f64, heads: usize, speed_mps: f64, turn_s: f64) -> Res
     })
 }
 
-/// The two alternating distances between passes along the tunnel in a head's sector, m, the smaller first.
+/// The two alternating distances between passes in a head's sector, m, the smaller first.
 ///
-/// `pitch_m` is T_x of one continuously rotating head (v T), `heads` their number s, `share` the position in the sector
-/// from 0 to 1.
-/// Their sum is 2 T_x / s everywhere; in the middle they are equal, at the ends one is zero.
+/// The distances are measured along the tunnel. `pitch_m` is T_x of one continuously rotating head (v T), `heads` the
+/// number s, `share` the position in the sector from 0 to 1.
+/// The sum of the distances is 2 T_x / s everywhere. In the middle they are equal; at the ends one is zero.
 /// Errors: fewer than two heads, a pitch below zero, a share outside 0 to 1.
 /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
 pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2], SamplingError> {
@@ -317,7 +322,7 @@ pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Each of the three figures meets the rule x = q v T / s with the other two, and q is the nearest whole number.
+    /// Each figure meets the rule x = q v T / s with the other two, and q is the nearest whole number.
     #[test]
     fn each_hull_rule_figure_fits_the_other_two() {
         for (apart_m, heads, speed_mps, turn_s, q) in
@@ -335,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn first_head_in_sectors_is_within_its_own_sector() {
+    fn first_head_outside_its_own_sector_is_an_error() {
         let sector = Sector { number: 1, of: 4, behind_m: 0.5, reversed: false };
         let at = |angle_rad: f64| in_step(InSector { angle_rad, growing: true }, &sector, 8.0, 0.1);
         assert!(at(0.0).is_ok() && at(TAU / 4.0).is_ok());

@@ -1,24 +1,31 @@
-//! Returns lost by chance, and the number of passes over a place that makes up for them.
+//! Returns lost by chance, and the number of passes over a place that makes up for these losses.
 //!
-//! The model: along a turn, a head loses pings in runs (Gilbert 1960: a share, and a share after a lost ping). Passes
-//! lose pings independently of each other. A lost run widens the circle that fits between two passes. A run as wide
-//! as the target removes the pass at that place. A return that is lost at the same angle in every turn is not lost by
-//! chance, and a slower speed does not restore it. The caller excludes such losses.
+//! The model: along a turn, a head loses pings in runs. After Gilbert (1960), the model has two parameters: the share
+//! of lost pings, and their share among the pings after a lost one. Passes lose pings independently of each other. A
+//! run of lost pings widens the circle that fits between two passes. A run as wide as the target removes the pass at
+//! that place.
+//!
+//! A return that is lost at the same angle in every turn is not lost by chance, and a slower speed does not restore
+//! it. The caller excludes such losses.
 
 use serde::{Deserialize, Serialize};
 
 use super::head::MAX_HEADS;
 use headrace_geometry::math;
 
-/// Length of wall, m; a share [`MAY_FAIL`] of such stretches may fail because of lost returns.
+/// Length of a stretch of wall, m.
+///
+/// The share [`MAY_FAIL`] of such stretches may fail because of lost returns.
 const STRETCH_M: f64 = 0.25;
-/// Share of stretches that may fail, so that 95 in 100 pass.
+/// Share of stretches that may fail: 95 in 100 stretches pass.
 const MAY_FAIL: f64 = 0.05;
-/// Maximum number of passes. Beyond that, waiting is impractical, and the returns themselves must improve.
+/// Maximum number of passes.
+///
+/// More passes take too long in practice; the returns themselves must then improve.
 pub const MOST_PASSES: f64 = 10.0;
 /// Probability below which a hole does not count as caused by chance.
 const HARDLY: f64 = 1e-3;
-/// Share of a hole's diameter, along and around, that lost passes and pings must cover.
+/// Share of a hole's diameter, along and around the tunnel, that lost passes and pings must cover.
 const INNER: f64 = 0.7;
 /// Upper limit of the share of lost returns: a head that receives one ping in a thousand receives nothing.
 const MOST_SHARE: f64 = 0.999;
@@ -26,9 +33,9 @@ const MOST_SHARE: f64 = 0.999;
 /// Rate at which a head's pings lose their returns by chance.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LossRate {
-    /// Share of its pings, from 0 to 1.
+    /// Share of lost pings among all pings, from 0 to 1.
     pub share: f64,
-    /// Share of those that follow a lost one, from 0 to 1.
+    /// Share of lost pings among those that follow a lost ping, from 0 to 1.
     pub after_lost: f64,
 }
 
@@ -42,14 +49,15 @@ impl LossRate {
         Self { share: self.share.clamp(0.0, MOST_SHARE), after_lost: self.after_lost.clamp(0.0, MOST_SHARE) }
     }
 
-    /// Probability that this many pings in a row are lost, at least one.
+    /// Probability that `pings` pings in a row are lost; at least one ping counts.
     fn chance_of_run(self, pings: f64) -> f64 {
         self.share * power(self.after_lost, (pings - 1.0).max(0.0))
     }
 
     /// Length in pings of the longest run to expect at this many places of the wall.
     ///
-    /// It occurs at one of them with the probability [`MAY_FAIL`]. Zero if even a single lost ping is rarer.
+    /// Such a run occurs at one of these places with the probability [`MAY_FAIL`]. Zero if even a single lost ping is
+    /// less likely.
     fn longest_run(self, places: f64) -> f64 {
         let expected = places * self.share / MAY_FAIL;
         if expected <= 0.0 {
@@ -72,11 +80,12 @@ pub struct Sampled {
 }
 
 impl Sampled {
-    /// Returns how many passes over each place replace one because of lost returns.
+    /// Returns the number of passes over each place that replace a single pass because of lost returns.
     ///
-    /// With these, 95 of 100 stretches of 0.25 m meet the target. It is the distance between passes that the target
-    /// allows, over the distance that losses leave. It ranges from 1 without losses to [`MOST_PASSES`], and is
-    /// continuous in all inputs. Heads take turns, and those with the highest losses come first.
+    /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of two distances
+    /// between passes: the one that the target allows, and the one that losses leave. It ranges from 1 without losses
+    /// to [`MOST_PASSES`], and is continuous in all inputs. The model assumes that heads pass in turn, and that the
+    /// heads with the highest losses come first.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn passes_needed(&self, rates: impl Iterator<Item = LossRate>) -> f64 {
@@ -95,15 +104,15 @@ impl Sampled {
         heads.sort_unstable_by(|a, b| b.chance_of_run(pings).total_cmp(&a.chance_of_run(pings)));
         let along_m = math::sqrt(lattice_m2);
         let places = self.perimeter_m / self.t_y_m * STRETCH_M / along_m;
-        // With more passes, there are more places at which they may fail together.
+        // More passes have more places at which they may fail together.
         let once = self.passes_for(places, along_m, heads);
         self.passes_for(places * once, along_m, heads)
     }
 
     /// Whether a hole of this diameter, m, may have been caused by chance.
     ///
-    /// Inputs: the distance between passes `along_m`, and the loss rate. If the hole is not by chance, that wall gives
-    /// no returns, and no speed helps.
+    /// `along_m` is the distance between passes, and `rate` the loss rate. If the hole is not by chance, the wall
+    /// there gives no returns at any speed.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn is_by_chance(&self, hole_m: f64, along_m: f64, rate: LossRate) -> bool {
@@ -122,9 +131,9 @@ impl Sampled {
         (self.target_m / self.t_y_m - 1.0).max(1.0)
     }
 
-    /// [`Sampled::passes_needed`] for a number of places at which passes may fail together.
+    /// Number of passes needed, for a number of places at which passes may fail together.
     ///
-    /// `along_m` is the allowed distance between passes without losses.
+    /// See [`Sampled::passes_needed`]. `along_m` is the allowed distance between passes without losses.
     fn passes_for(&self, places: f64, along_m: f64, heads: &[LossRate]) -> f64 {
         let pings = self.pings_across();
         let mut left = places;
@@ -145,8 +154,8 @@ impl Sampled {
     /// Distance between passes at which the largest circle equals the target, m.
     ///
     /// One of the passes misses a run of pings. With half a step h and half the gap g, the circle touches both ends
-    /// of the gap and two neighbours of the previous pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the pass with
-    /// the gap, where a is the distance between passes.
+    /// of the gap and two neighbouring samples of the previous pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the
+    /// pass with the gap, where a is the distance between passes.
     fn along_with_run_m(&self, lost: f64) -> f64 {
         let half_m = self.t_y_m / 2.0;
         let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);

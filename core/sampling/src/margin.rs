@@ -6,20 +6,20 @@
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation without a margin, m: about that of navigation without error estimates.
+/// Standard deviation that requires no margin, m: about that of navigation without error estimates.
 const NOTHING_M: f64 = 0.002;
-/// Minimum share of the distance between passes that a margin leaves.
+/// Minimum share of the distance between passes that remains after the margin.
 ///
 /// No speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;
-/// Maximum share of the target that a margin takes.
+/// Maximum share of the target that the margin takes.
 const MOST_SHARE: f64 = 0.2;
 /// Share of the time between heads apart along the hull that counts towards the time between passes.
 ///
-/// Only some neighbouring passes are by heads apart, and holes between these grow by less than the heads' separation.
-/// With this share, D is within two of its standard deviations 93 % of the time, over the dives of
-/// `tests/tests/navigation/fusion.rs` with four heads. Over similar dives it is 80 % with a share of 0, and 99 % with
-/// 1.
+/// Only some neighbouring passes are by heads apart, and holes between these passes grow by less than the heads'
+/// separation. With this share, D is within two of its standard deviations 93 % of the time, over the dives of
+/// `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share of 0, and
+/// 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
@@ -28,9 +28,9 @@ const LONGEST_APART_S: f64 = 20.0;
 
 /// Time over which position errors accumulate between neighbouring passes of a place, s.
 ///
-/// It is the time between two passes of evenly spread heads, plus a share of the time until the rearmost head reaches
-/// the position of the foremost. `passes_per_s` is the sum of the heads' turns per second, above zero; `apart_m` is
-/// the length of hull between them.
+/// The time is the sum of two terms: the time between two passes of evenly spread heads, and a share of the time
+/// until the rearmost head reaches the position of the foremost. `passes_per_s` is the sum of the heads' turns per
+/// second, above zero; `apart_m` is the length of hull between the heads.
 pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share: f64) -> f64 {
     let apart_s = (apart_m / speed_mps.abs().max(SLOW_MPS)).min(LONGEST_APART_S);
     1.0 / passes_per_s + apart_share * apart_s
@@ -38,9 +38,10 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 
 /// Part of a target reserved for position errors, m.
 ///
-/// It is `confidence_sd` times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
-/// distance between neighbours of one turn. It is continuous in all inputs. It is at most a fifth of the target, and
-/// leaves at least three fifths of the distance between passes. Beyond that, a slower speed costs more than it gains.
+/// The margin is `confidence_sd` times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
+/// distance between neighbours of one turn. The margin is continuous in all inputs. It is at most a fifth of the
+/// target, and leaves at least three fifths of the distance between passes. With a larger margin, a slower speed
+/// would cost more than it gains.
 pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t_y_m: f64) -> f64 {
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
     let least_m = math::sqrt(LEFT_SHARE * LEFT_SHARE * along_m2 + t_y_m * t_y_m);
@@ -50,23 +51,23 @@ pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t
 
 /// Exponent with which position errors grow with the time between two passes.
 ///
-/// It is between that of independent noise, 0.5, and that of drifting speeds, 1. VITA 2 with two heads, swaying, has
-/// 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
+/// It lies between the exponent of independent noise, 0.5, and that of drifting speeds, 1. VITA 2 with two heads,
+/// swaying, has 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
 const GROWTH: f64 = 0.7;
 
 /// Target less the margin for position errors, as a function of speed.
 ///
-/// The errors are known at the present speed. At half of it, heads apart along the hull pass a place twice as far
-/// apart in time, and the margin is larger.
+/// The errors are known at the present speed only. At half that speed, the time between passes of heads apart along
+/// the hull is twice as long, and the margin is larger.
 #[derive(Debug, Clone, Copy)]
 pub struct RemainingTarget {
     /// Target T, m.
     pub target_m: f64,
-    /// Standard deviations of a hole that a verdict of pass keeps below the target.
+    /// Number of standard deviations of a hole's size by which a passed section stays below the target.
     pub confidence_sd: f64,
     /// Standard deviation of a hole's size as measured, m.
     pub pass_error_m: f64,
-    /// [`error_time_s`] while that was measured, seconds.
+    /// [`error_time_s`] at the measurement of `pass_error_m`, seconds.
     pub measured_s: f64,
     /// Time between two passes of evenly spread heads, seconds.
     pub even_gap_s: f64,
@@ -80,7 +81,7 @@ impl RemainingTarget {
     /// Returns the remaining target at a speed, m; grows continuously with speed.
     pub fn at_m(&self, speed_mps: f64) -> f64 {
         let time_s = error_time_s(1.0 / self.even_gap_s, self.apart_m, speed_mps, APART_SHARE);
-        // Without turning heads, the time is unknown.
+        // If no heads turn, the time is unknown.
         let same = self.measured_s <= 0.0 || (time_s - self.measured_s).abs() <= f64::EPSILON * time_s;
         let growth = if same { 1.0 } else { math::exp(GROWTH * math::ln(time_s / self.measured_s)) };
         let error_m = self.pass_error_m * growth;
@@ -96,16 +97,16 @@ impl RemainingTarget {
 /// Expected position errors between two passes, before a dive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedErrors {
-    /// Standard deviations of a hole that a verdict of pass keeps below the target.
+    /// Number of standard deviations of a hole's size by which a passed section stays below the target.
     pub confidence_sd: f64,
-    /// Ascending times between two passes, s, and the standard deviation of a hole's size after each, m.
+    /// Times between two passes in ascending order, s, each with the standard deviation of a hole's size, m.
     pub by_time: Vec<[f64; 2]>,
 }
 
 impl ExpectedErrors {
-    /// Returns the standard deviation after a time between passes, m.
+    /// Returns the standard deviation of a hole's size after a time between passes, m.
     ///
-    /// It is interpolated, and proportional to time beyond the last entry.
+    /// The value is interpolated, and proportional to time beyond the last entry.
     pub fn pass_error_m(&self, time_s: f64) -> f64 {
         let mut before = [0.0, 0.0];
         for &after in &self.by_time {
@@ -122,17 +123,17 @@ impl ExpectedErrors {
 /// A cause that lowers the speed below that of the ideal geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Margin {
-    /// No cause: the distance between turns.
+    /// No cause but the distance between turns.
     Geometry,
     /// Wall that the vehicle hides from some of its heads, or that is out of their reach.
     Hidden,
-    /// Heads that aren't evenly phased, or side by side.
+    /// Heads that are not evenly phased, or that are side by side.
     Phase,
     /// Beams that swing along the wall.
     Swing,
-    /// Position that is uncertain.
+    /// Uncertain position.
     Position,
-    /// Returns that are lost.
+    /// Lost returns.
     Losses,
 }
 
@@ -154,29 +155,29 @@ impl Margin {
     }
 }
 
-/// Largest speeds with the margins added one after the other, m/s; each is at most the one before.
+/// Largest speeds as the margins are added one after the other, m/s; no speed exceeds the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.
     pub geometry_mps: f64,
-    /// Including wall that the vehicle hides.
+    /// Speed with the wall that the vehicle hides, too.
     pub hidden_mps: f64,
-    /// Including phases and positions of the heads.
+    /// Speed with the phases and positions of the heads, too.
     pub phase_mps: f64,
-    /// Including the swing of beams.
+    /// Speed with the swing of beams, too.
     pub swing_mps: f64,
-    /// Including position errors.
+    /// Speed with position errors, too.
     pub position_mps: f64,
-    /// Including passes for lost returns: the largest speed.
+    /// Speed with the passes for lost returns, too: the largest speed that meets the target.
     pub losses_mps: f64,
-    /// Standard deviation of a hole's size between two passes assumed for `position_mps`, m.
+    /// Standard deviation of a hole's size between two passes that `position_mps` assumes, m.
     pub pass_error_m: f64,
 }
 
 impl Margins {
-    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s; each is limited to the one before.
+    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s; no speed may exceed the one before.
     pub fn of(speeds_mps: [f64; 6], pass_error_m: f64) -> Self {
-        // It works backwards, so that a margin with a negative cost counts as zero.
+        // Each speed is raised to the largest one after it, so that a margin with a negative cost counts as zero.
         let mut most = 0.0_f64;
         let mut speeds = speeds_mps;
         for speed in speeds.iter_mut().rev() {
@@ -207,7 +208,7 @@ impl Margins {
 
     /// Returns the margin with the highest cost.
     ///
-    /// [`Margin::Geometry`] if none takes a twentieth of the speed.
+    /// The result is [`Margin::Geometry`] if no margin costs more than a twentieth of the speed.
     pub fn costliest(&self) -> Margin {
         const NOTABLE: f64 = 0.05;
         let costly = self.prices_mps().into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -222,12 +223,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn margin_is_a_multiple_of_the_sd_with_limits() {
+    fn margin_is_a_limited_multiple_of_the_standard_deviation() {
         let margin_m = |pass_error_m: f64, t_y_m: f64| position_margin_m(0.5, 2.0, pass_error_m, t_y_m);
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
         assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
-        // Steps nearly reach the target: three fifths of the rest along the tunnel remain.
+        // If steps nearly reach the target, three fifths of the distance between passes remain.
         let sure_m = 0.5 - margin_m(1.0, 0.48);
         assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);
         assert!(margin_m(0.1, 0.5).abs() <= 0.0 && margin_m(0.1, 0.6).abs() <= 0.0);
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn error_time_grows_with_the_time_between_passes() {
+    fn expected_error_grows_with_the_time_between_passes() {
         let errors = ExpectedErrors { confidence_sd: 2.0, by_time: vec![[2.0, 0.006], [4.0, 0.01]] };
         let all = [1.0, 2.0, 3.0, 4.0, 8.0].map(|time_s| errors.pass_error_m(time_s));
         assert!(all.iter().zip([0.003, 0.006, 0.008, 0.01, 0.02]).all(|(a, b)| (a - b).abs() < 1e-12));
@@ -254,7 +255,7 @@ mod tests {
         assert!((error_time_s(0.5, 1.0, 0.0, 0.4) - 10.0).abs() < 1e-12, "at rest");
     }
 
-    /// Errors measured at one speed give the same margin at another speed as errors measured there.
+    /// At any speed, errors measured at another speed give the same margin as errors measured at that speed.
     #[test]
     fn margin_is_independent_of_the_speed_of_measurement() {
         let sure = RemainingTarget {
@@ -267,7 +268,7 @@ mod tests {
             t_y_m: 0.1,
         };
         assert!((sure.at_m(0.1) - (0.5 - 2.0 * 0.01)).abs() < 1e-9);
-        // 4 s plus 0.4 of 16 s, of 8 s and of 0 s.
+        // Each time is 4 s plus 0.4 of 16 s, 8 s or 0 s.
         let times_s = [10.4, 7.2, 4.0];
         let error_m = |time_s: f64| 0.012 * math::exp(GROWTH * math::ln(time_s / times_s[1]));
         let at = [0.05, 0.1, f64::INFINITY].map(|speed_mps| sure.at_m(speed_mps));
@@ -289,7 +290,7 @@ mod tests {
     #[test]
     fn margin_costs_add_up_and_the_costliest_is_named() {
         let margins = Margins::of([0.23, 0.118, 0.117, 0.118, 0.108, 0.1], 0.02);
-        // Swing cannot give back the cost of phase.
+        // The gain by swing is set to zero; it does not reduce the cost of phase.
         let expected = [0.23, 0.118, 0.118, 0.118, 0.108, 0.1];
         assert!(margins.speeds_mps().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
         let sum: f64 = margins.prices_mps().iter().map(|(_, price)| price).sum();

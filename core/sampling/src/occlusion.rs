@@ -4,7 +4,7 @@ use super::head::{HeadSpec, MAX_HEADS};
 use headrace_geometry::frames::{Body, Mount, Vec3, head_direction};
 use headrace_geometry::math::{self, TAU};
 
-/// Angular spacing of the search, radians (0.05 degrees). It may miss narrower obstructions.
+/// Angular spacing of the search, radians (0.05 degrees). The search may miss narrower obstructions.
 const SEARCH_STEP_RAD: f64 = TAU / 7200.0;
 
 /// A solid part of the vehicle.
@@ -12,18 +12,18 @@ const SEARCH_STEP_RAD: f64 = TAU / 7200.0;
 pub enum Obstacle {
     /// A box along the body's axes, m.
     Box {
-        /// The corner with the least coordinates.
+        /// The corner with the smallest coordinates.
         least: Vec3<Body>,
-        /// The corner with the largest.
+        /// The corner with the largest coordinates.
         most: Vec3<Body>,
     },
     /// A capped cylinder.
     Cylinder {
-        /// Centre of its first end.
+        /// Centre of the first end.
         from: Vec3<Body>,
-        /// Vector to the centre of its other end, m.
+        /// Vector from the first end's centre to the other end's centre, m.
         along: Vec3<Body>,
-        /// Its radius, m.
+        /// Radius, m.
         radius_m: f64,
     },
 }
@@ -33,24 +33,25 @@ pub enum Obstacle {
 pub struct AngleRange {
     /// Start angle, radians, in [0, 2 pi).
     pub from_rad: f64,
-    /// Its size, radians, up to 2 pi.
+    /// Size of the range, radians, up to 2 pi.
     pub size_rad: f64,
 }
 
 impl AngleRange {
-    /// Whether it contains an angle; the ends count.
+    /// Whether the range contains an angle; the ends belong to the range.
     pub fn has(&self, angle_rad: f64) -> bool {
         math::wrap(angle_rad - self.from_rad, TAU) <= self.size_rad
     }
 
-    /// Its middle, radians.
+    /// Middle of the range, radians.
     pub fn middle_rad(&self) -> f64 {
         self.from_rad + self.size_rad / 2.0
     }
 
     /// Returns the same directions as angles of a straight-mounted head, for pictures.
     ///
-    /// 0 is down, growing to the vehicle's left. A head that faces aft turns the other way.
+    /// 0 is down, and angles grow to the vehicle's left. The angles of a head that faces aft grow in the opposite
+    /// sense.
     #[must_use]
     pub fn across_body(&self, mount: &Mount) -> Self {
         let across = |angle_rad: f64| {
@@ -80,7 +81,9 @@ impl Obstacle {
         }
     }
 
-    /// Whether a point is inside a box. Always false for cylinders, since they are heads and may share a position.
+    /// Whether a point is inside a box.
+    ///
+    /// Always false for cylinders, since these are heads and heads may share a position.
     pub fn holds(&self, place: Vec3<Body>) -> bool {
         match self {
             Self::Box { least, most } => {
@@ -91,16 +94,16 @@ impl Obstacle {
         }
     }
 
-    /// Whether a ray from outside meets it.
+    /// Whether a ray from outside meets the obstacle.
     ///
-    /// A ray from inside does not, so that an obstacle around a head does not hide the wall from it.
+    /// A ray from inside does not, so that an obstacle around a head does not hide the wall from this head.
     pub fn stops(&self, from: Vec3<Body>, direction: Vec3<Body>) -> bool {
         self.enters_m(from, direction).is_some()
     }
 
-    /// Distance at which a ray from outside meets it, in lengths of `direction`; metres for a unit vector.
+    /// Distance at which a ray from outside meets the obstacle, in lengths of `direction`.
     ///
-    /// `None` for a ray that misses it or begins inside.
+    /// The distance is in metres for a unit vector. `None` for a ray that misses the obstacle or begins inside.
     pub fn enters_m(&self, from: Vec3<Body>, direction: Vec3<Body>) -> Option<f64> {
         match self {
             Self::Box { least, most } => box_entered(*least, *most, from, direction),
@@ -171,8 +174,8 @@ fn cylinder_entered(
 
 /// Returns the angles at which obstacles hide the wall from a head, in ascending order.
 ///
-/// Edges are exact to 1e-12 rad. The beam is taken as a ray; a real beam is weakened for another half of its width on
-/// either side.
+/// Edges are exact to 1e-12 rad. The beam is idealised as a ray. A real beam is also weakened within half of its
+/// width on either side of these angles.
 pub fn hidden_angles(mount: &Mount, obstacles: &[Obstacle]) -> Vec<AngleRange> {
     let hidden = |angle_rad: f64| {
         let direction = mount.rotation * head_direction(angle_rad);
@@ -244,7 +247,9 @@ mod tests {
         fixtures::head(position, aft, 0.04)
     }
 
-    /// A point on a side is outside, and so is one inside in two of three coordinates. Cylinders contain nothing.
+    /// A point on a side is outside, like a point inside in only two of three coordinates.
+    ///
+    /// Cylinders contain nothing.
     #[test]
     fn box_contains_points_inside_all_its_sides() {
         let hull = Obstacle::Box { least: Vec3::new(-1.0, -0.3, -0.2), most: Vec3::new(0.5, 0.3, 0.2) };
@@ -266,7 +271,7 @@ mod tests {
         let hidden = hidden_by_vehicle(&pair, &[]);
         for (ranges, middle_deg) in hidden.iter().zip([270.0, 90.0]) {
             assert_eq!(ranges.len(), 1);
-            // A ray touches a cylinder of radius r at a distance g at asin(r / g) from its axis.
+            // The tangent to a cylinder of radius r at a distance g is asin(r / g) off the direction to its axis.
             let expected = 2.0 * math::asin(0.04 / 0.3);
             assert!((ranges[0].size_rad - expected).abs() < 1e-11, "{}", ranges[0].size_rad.to_degrees());
             assert!((ranges[0].middle_rad().to_degrees() - middle_deg).abs() < 1e-9);
@@ -278,7 +283,7 @@ mod tests {
     fn heads_hide_angles_towards_each_other_in_any_orientation() {
         for aft in [false, true] {
             let pair = [head([0.5, 0.15, 0.0], aft), head([0.5, -0.15, 0.0], aft)];
-            // The left head's hidden range lies to the right, at 270 degrees, and the right head's to the left.
+            // The left head's hidden range lies to the right, at 270 degrees. The right head's lies to the left.
             for ((ranges, spec), middle_deg) in
                 hidden_by_vehicle(&pair, &[]).iter().zip(&pair).zip([270.0, 90.0])
             {
@@ -300,7 +305,7 @@ mod tests {
         assert!(hidden_by_vehicle(&apart, &[]).iter().all(Vec::is_empty));
         let together = [head([0.0; 3], false), head([0.0; 3], false)];
         assert!(hidden_by_vehicle(&together, &[]).iter().all(Vec::is_empty));
-        // Back to back, one body ends where the other begins; it extends 0.2 m behind each beam.
+        // Back to back, each body extends 0.2 m behind its beam, so the bodies overlap along the hull.
         let near = [head([0.1, 0.1, 0.0], false), head([-0.05, -0.1, 0.0], true)];
         assert!(hidden_by_vehicle(&near, &[]).iter().all(|ranges| ranges.len() == 1));
     }
@@ -316,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn ray_enters_at_its_first_contact() {
+    fn ray_from_outside_enters_at_its_first_contact() {
         let x = Vec3::new(1.0, 0.0, 0.0);
         let hull = Obstacle::Box { least: Vec3::new(2.0, -1.0, -1.0), most: Vec3::new(3.0, 1.0, 1.0) };
         assert_eq!(hull.enters_m(Vec3::zero(), x), Some(2.0));
@@ -333,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn head_inside_a_box_sees_all_and_head_in_a_tube_sees_nothing() {
+    fn box_around_a_head_hides_nothing_and_tube_around_it_hides_all() {
         let around = Obstacle::Box { least: Vec3::new(-1.0, -1.0, -1.0), most: Vec3::new(1.0, 1.0, 1.0) };
         assert!(hidden_angles(&head([0.0; 3], false).mount, &[around]).is_empty());
         let ring: Vec<Obstacle> = (0..4)
@@ -376,7 +381,7 @@ mod tests {
                 assert!(!inside(direction.scaled(enters_m - 1e-9)), "direction {direction:?}");
                 assert!(inside(direction.scaled(enters_m + 1e-9)) || !marched, "direction {direction:?}");
             }
-            // Marching may miss a ray that only grazes.
+            // Marching in steps may miss a ray that only grazes the cylinder.
             assert!(stops || !marched, "direction {direction:?}");
             met += i32::from(stops && marched) - i32::from(stops && !marched);
         }

@@ -12,13 +12,15 @@ use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz};
 use sectors::{AT_ONCE, Leg};
 
-/// Speed below which a vehicle is at rest, m/s; its heads' offsets along the hull then have no phase.
-const AT_REST_MPS: f64 = 1e-3;
-/// Relative difference of turn periods above which heads run out of step.
-const SAME_TURN: f64 = 0.02;
-/// Cosine of the angle between a head's axis and the tunnel's below which it is askew.
+/// Speed below which a vehicle counts as at rest, m/s.
 ///
-/// Its scan plane then meets no wall near the vehicle.
+/// The phases then do not depend on the heads' offsets along the hull.
+const AT_REST_MPS: f64 = 1e-3;
+/// Relative difference of turn periods above which heads count as out of step.
+const SAME_TURN: f64 = 0.02;
+/// Limit for the cosine of the angle between a head's axis and the tunnel's axis.
+///
+/// Below it, the head is askew: its scan plane meets no wall near the vehicle.
 const ASKEW: f64 = 0.1;
 
 /// Measured state of a vehicle and its heads at one epoch.
@@ -28,7 +30,7 @@ pub struct Situation {
     pub pose: Option<Pose>,
     /// Speed along the tunnel, m/s; negative on the way back.
     pub speed_mps: f64,
-    /// Standard deviation of the distance between two passes, the largest around the wall, m.
+    /// Standard deviation of the distance between two passes, m: the largest value around the wall.
     pub pass_error_m: f64,
     /// Layout of the heads, from the vehicle file.
     pub layout: HeadLayout,
@@ -40,7 +42,9 @@ pub struct Situation {
     pub deaf: HeadSet,
     /// Chance losses of each head, by number.
     pub losses: [LossRate; MAX_HEADS],
-    /// Upper bound of the chance losses of any head: all missing returns, until enough pings have been counted.
+    /// Upper bound of the chance losses of any head.
+    ///
+    /// All missing returns count as losses until enough pings have been counted.
     pub lost_at_most: LossRate,
 }
 
@@ -58,9 +62,9 @@ pub struct Passes {
     /// Turn period of each head, seconds.
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
-    /// Largest parallax of heads side by side, as an error of their pass times, seconds.
+    /// Largest parallax of side-by-side heads, as an error of their pass times, seconds.
     parallax_s: f64,
-    /// The vehicle is too slow for phases along the tunnel to have a meaning.
+    /// Whether the vehicle is too slow for phases along the tunnel to have a meaning.
     at_rest: bool,
     /// Whether extra passes are required for lost returns.
     lossy: bool,
@@ -68,34 +72,38 @@ pub struct Passes {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Pattern {
-    /// All rotate continuously, in one sense and at one rate.
+    /// All heads rotate continuously, in one sense and at one rate.
     ///
-    /// By head, the phase of its passes in a turn's advance, in [0, 1).
+    /// The value of each head is the phase of its passes, as a share of the vehicle's advance per turn, in [0, 1).
     Turning([f64; MAX_HEADS]),
-    /// Each sweeps back and forth.
+    /// Each head sweeps back and forth.
     Sectors {
         /// The longest period of a sweep there and back, seconds.
         sweep_s: f64,
-        /// See [`Passes::uneven_ends`].
+        /// Unevenness at shared ends, as in [`Passes::uneven_ends`].
         uneven: f64,
     },
-    /// Opposite senses or different rates: passes come at uneven times, and only one head is reliable.
+    /// Heads turn in opposite senses or at different rates.
+    ///
+    /// Passes come at uneven times, and only one head is reliable.
     Loose,
 }
 
-/// Measured phasing of the heads, from which the passes at any speed follow.
+/// Measured phasing of the heads, from which their passes at any speed follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Phasing {
     heads: HeadSet,
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
     ahead_m: [f64; MAX_HEADS],
-    /// For heads in sectors, the position of each in its sweep.
+    /// Position of each head in its sweep, for heads in sectors.
     legs: [Option<Leg>; MAX_HEADS],
 }
 
 impl Phasing {
-    /// Creates it from the measured situation. Without a fix, the vehicle is assumed to lie along the tunnel.
+    /// Creates the phasing from the measured situation.
+    ///
+    /// Without a fix, the vehicle is assumed to lie along the tunnel.
     pub fn of(situation: &Situation) -> Self {
         let motions = &situation.heads;
         let present = motions.iter().enumerate().filter(|(_, motion)| motion.is_some());
@@ -124,7 +132,7 @@ impl Phasing {
         }
     }
 
-    /// The same if the heads' sectors are known; angles are in each sensor frame, by number.
+    /// Returns the phasing with known sectors, by head number; their angles are in each head's sensor frame.
     #[must_use]
     pub fn in_sectors_of<'a>(
         self,
@@ -140,7 +148,7 @@ impl Phasing {
 
     /// Whether the heads interleave evenly in some intervals of speed only.
     ///
-    /// This is so if they are apart along the hull and phased with each other.
+    /// True if the heads are apart along the hull and phased with each other.
     pub fn fits_some_speeds(&self) -> bool {
         let is_phased = match self.pattern {
             Pattern::Turning(_) => true,
@@ -158,16 +166,18 @@ impl Phasing {
         self.spread_m()
     }
 
-    /// The same for any heads.
+    /// Largest distance along the tunnel between the planes in which the heads meet the wall, m.
+    ///
+    /// Heads that are not phased with each other count as well.
     fn spread_m(&self) -> f64 {
         let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
     }
 
-    /// Mean distance along the hull between successive heads in a schedule, as a share of [`Phasing::apart_m`].
+    /// Mean distance of successive heads in a schedule, as a share of [`Phasing::apart_m`].
     ///
-    /// It is 1 for two heads, and a half for four heads whose neighbours are pairwise together. Zero if none are
-    /// apart.
+    /// The distance is measured along the hull. The share is 1 for two heads, and a half for four heads if successive
+    /// heads are side by side in pairs. It is zero if no heads are apart.
     pub fn neighbours_apart(&self) -> f64 {
         let apart_m = self.apart_m();
         if apart_m <= 0.0 {
@@ -185,8 +195,8 @@ impl Phasing {
 
     /// Returns the heads with the phases of a schedule of `scheduled` heads for `planned_mps`.
     ///
-    /// A speed of zero means a schedule that ignores positions along the hull. Heads in sectors or out of step are
-    /// unchanged.
+    /// A speed of zero means a schedule that ignores positions along the hull. Heads in sectors or out of step keep
+    /// their phases.
     /// Source: Jorge et al. 2021, Eq. 20.
     #[must_use]
     pub fn as_scheduled(&self, scheduled: usize, planned_mps: f64) -> Self {
@@ -204,10 +214,11 @@ impl Phasing {
 
     /// Returns the passes at a speed of `speed_mps`.
     ///
-    /// Continuous rotation: head k passes the vertical at the times t_k + i T; as it sits x_k ahead of the vehicle's
-    /// origin, it meets the wall at chainages x_k + v (t_k + i T). Divided by v T, these are phases on a circle.
-    /// Sectors: a place near a sector's end waits for a whole sweep there and back. The timing of neighbours depends
-    /// on the speed.
+    /// Continuous rotation: head k passes the vertical at the times t_k + i T. The head is x_k ahead of the vehicle's
+    /// origin, so it meets the wall at chainages x_k + v (t_k + i T). Divided by v T, these chainages are phases on a
+    /// circle.
+    /// Sectors: a place near a sector's end waits for a whole sweep there and back. The time between the passes of
+    /// neighbouring heads at that end depends on the speed.
     /// Source: Jorge et al. 2021, §5.1 and §5.2.
     pub fn at(&self, speed_mps: f64) -> Passes {
         let Self { heads, turns_s, mut pattern, ahead_m, legs } = *self;
@@ -229,7 +240,7 @@ impl Phasing {
     }
 }
 
-/// Time until each head next passes the vertical, as a share of a turn.
+/// Angle until each head next passes the vertical, as a share of a turn.
 ///
 /// `None` for heads with opposite senses or different rates.
 fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]> {
@@ -239,7 +250,7 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
     if longest_s - shortest_s > SAME_TURN * shortest_s {
         return None;
     }
-    // Heads that all turn in the opposite sense are mirrored into this one.
+    // If all heads turn in the opposite sense, their angles are mirrored.
     let mirror = if turning().all(|motion| body_rate(motion) < 0.0) { -1.0 } else { 1.0 };
     let mut phases = [0.0; MAX_HEADS];
     for (motion, phase) in motions.iter().zip(&mut phases) {
@@ -254,10 +265,10 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
 
 /// Distance ahead of the vehicle's origin at which a head meets the wall, along the tunnel, m.
 ///
-/// It is the same all round the wall, except for a part common to all heads with parallel axes. `None` for a head
-/// whose scan plane lies along the tunnel.
+/// The distance is the same all round the wall, except for a part common to all heads with parallel axes. `None` for
+/// a head whose scan plane lies along the tunnel.
 ///
-/// Its samples lie in the plane through the head normal to its axis n: `x n_x + y n_y + z n_z = (head) n`.
+/// The head's samples lie in the plane through the head normal to its axis n: `x n_x + y n_y + z n_z = (head) n`.
 pub fn ahead_m(attitude: &Rot<Tunnel, headrace_geometry::frames::Body>, mount: &Mount) -> Option<f64> {
     let axis = *attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
     let offset = *attitude * mount.position;
@@ -284,7 +295,9 @@ pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
 }
 
 impl Passes {
-    /// Returns these passes for side-by-side heads, whose angles at one place differ by up to `parallax_rad`.
+    /// Returns these passes for side-by-side heads.
+    ///
+    /// The heads' angles towards one place on the wall differ by up to `parallax_rad`.
     #[must_use]
     pub fn beside(self, parallax_rad: f64) -> Self {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
@@ -297,21 +310,21 @@ impl Passes {
         Self { lossy, ..self }
     }
 
-    /// Whether lost returns count.
+    /// Whether extra passes are required for lost returns.
     pub fn is_lossy(&self) -> bool {
         self.lossy
     }
 
-    /// Returns the longest time that `needed` neighbouring passes of these heads over a place take, s.
+    /// Returns the longest time that `needed` successive passes of the heads `seen_by` over a place take, s.
     ///
-    /// `gap_s` is the longest time between two; the other passes of a turn share the rest. Continuous; equals `gap_s`
-    /// up to one pass.
+    /// `gap_s` is the longest time between two passes; the other passes of a turn share the rest of the turn evenly.
+    /// The result is continuous in `needed`, and equals `gap_s` for up to one pass.
     pub fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
         let (passing, turn_s) = match self.pattern {
             Pattern::Turning(_) => {
                 (seen_by.iter().filter(|head| self.heads.has(*head)).count(), self.turn_s())
             }
-            // There and back: at a sector's end two passes follow at once.
+            // There and back: at a sector's end, one pass follows another immediately.
             Pattern::Sectors { sweep_s, .. } => (2, sweep_s),
             Pattern::Loose => (1, gap_s),
         };
@@ -328,8 +341,8 @@ impl Passes {
 
     /// Creates passes of continuously rotating heads, evenly phased in order of their numbers.
     ///
-    /// This is the result of a schedule for this speed if their turn periods are equal. If not, heads run out of
-    /// step, and no phase is reliable. `turn_s` gives the turn period of a head, seconds.
+    /// A schedule for the present speed has these passes if the turn periods are equal. Otherwise, heads run out of
+    /// step, and no phase is reliable. `turn_s` returns the turn period of a head, seconds.
     /// Errors: no head.
     pub fn evenly_phased(heads: HeadSet, turn_s: impl Fn(usize) -> f64) -> Result<Self, SamplingError> {
         const IN_STEP: f64 = 1e-6;
@@ -345,9 +358,9 @@ impl Passes {
         Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// Creates passes of heads in sectors, started by a schedule for this speed.
+    /// Creates passes of heads in sectors, started by a schedule for the present speed.
     ///
-    /// `sweep_s` is the period there and back, s.
+    /// `sweep_s` is the period of a sweep there and back, s.
     ///
     /// Errors: no head.
     pub fn in_sectors(heads: HeadSet, sweep_s: f64) -> Result<Self, SamplingError> {
@@ -358,14 +371,14 @@ impl Passes {
         Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// Returns the heads that pass.
+    /// Returns the set of heads.
     pub fn heads(&self) -> HeadSet {
         self.heads
     }
 
-    /// Returns the longest time between two passes over a place that these heads see, s.
+    /// Returns the longest time between two passes of the heads `seen_by` over a place, s.
     ///
-    /// `None` if none sees it.
+    /// `None` if none of these heads turns.
     pub fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
         let passing = || seen_by.iter().filter(|head| self.heads.has(*head));
         passing().next()?;
@@ -387,10 +400,11 @@ impl Passes {
         })
     }
 
-    /// Largest unevenness of neighbours at the end that their sectors share.
+    /// Largest unevenness of neighbouring heads at the end that their sectors share.
     ///
-    /// It is a share of the advance in a sweep there and back. It ranges from 0 (one is half a sweep after the other)
-    /// to 0.5 (both at the same place, or unknown). `None` for continuously rotating heads.
+    /// The unevenness is a share of the vehicle's advance in a sweep there and back. It is 0 if one head comes half a
+    /// sweep after the other, and 0.5 if both come at the same place or the timing is unknown. `None` for
+    /// continuously rotating heads.
     pub fn uneven_ends(&self) -> Option<f64> {
         match self.pattern {
             Pattern::Sectors { uneven, .. } => Some(uneven),
@@ -403,7 +417,7 @@ impl Passes {
         self.turns_s.into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns the heads evenly phased and without parallax; heads out of step are unchanged.
+    /// Returns the passes with evenly phased heads and without parallax; heads out of step are unchanged.
     #[must_use]
     pub fn evened(&self) -> Self {
         let even = match self.pattern {
@@ -425,9 +439,9 @@ impl Passes {
 
     /// Returns the phase error of each head relative to the first that turns, radians.
     ///
-    /// It is an angle of the head's turn, in [-pi, pi). Positive: it passes a place later, farther ahead, than in the
-    /// schedule for `scheduled` heads. `None` for an absent head, for heads that aren't phased with each other, and
-    /// at rest.
+    /// The error is an angle of the head's turn, in [-pi, pi). If it is positive, the head passes a place later, and
+    /// farther ahead, than in the schedule for `scheduled` heads. `None` for an absent head, for heads that aren't
+    /// phased with each other, and at rest.
     /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
     pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {
         let mut errors = [None; MAX_HEADS];
@@ -444,14 +458,14 @@ impl Passes {
     }
 }
 
-/// Scheduled phase of head `head` of `heads` in a turn's advance.
+/// Scheduled phase of the head number `head` of `heads`, as a share of the vehicle's advance per turn.
 ///
 /// A head that is ahead in angle passes a place earlier.
 fn scheduled_phase(head: usize, heads: usize) -> f64 {
     -(head as f64) / heads.max(1) as f64
 }
 
-/// Largest gap between neighbours on a circle of circumference 1; sorts the phases.
+/// Largest gap between neighbouring phases on a circle of circumference 1; sorts the phases.
 fn largest_gap(phases: &mut [f64]) -> f64 {
     phases.sort_unstable_by(f64::total_cmp);
     let wrapped = phases.first().zip(phases.last()).map_or(1.0, |(first, last)| first + 1.0 - last);

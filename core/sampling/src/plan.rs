@@ -26,13 +26,15 @@ pub use wall::{PatternSample, WallPlace};
 
 /// Share of the largest speed for which heads should be started.
 ///
-/// A pilot keeps a speed within 5 %, and heads apart along the hull are in phase only near the planned one. Source:
+/// A pilot keeps a speed within 5 %, and heads apart along the hull are in phase only near the planned speed. Source:
 /// field.md, "Driven".
 pub const HELD_SHARE: f64 = 0.95;
-/// Soundings per ring: 0.1 degrees apart, so that a step is evaluated from many start angles.
+/// Number of soundings per ring: soundings 0.1 degrees apart cover many start angles of each step.
 const RING: u32 = 3600;
 
-/// Maximum number of steps down to the converged speed; each step is a fraction of the one before.
+/// Maximum number of iterations until the speed converges.
+///
+/// Each change of the speed is a fraction of the one before.
 const FALLS: u32 = 12;
 
 /// A tunnel, a vehicle and the tolerances to plan for.
@@ -44,7 +46,7 @@ pub struct Inspection {
     pub length_m: f64,
     /// Nominal position of the vehicle in the cross-section.
     pub place: Yz,
-    /// Its heads, with the modes of each; all heads use the same mode.
+    /// Heads of the vehicle, with the modes of each head; all heads use the same mode.
     pub heads: Vec<(HeadSpec, Vec<HeadMode>)>,
     /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
@@ -66,7 +68,7 @@ struct Stance {
     strips: Strips,
     farthest_m: f64,
     parallax_rad: f64,
-    /// Spread of the heads' displacements along the tunnel from their scheduled positions, m.
+    /// Spread of the heads' displacements along the tunnel relative to their positions along the hull, m.
     shift_m: f64,
     /// Distance between the heads along the tunnel, m.
     apart_m: f64,
@@ -75,12 +77,12 @@ struct Stance {
 /// A mode that all heads can be set to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedMode {
-    /// The mode of the first head; its name and step are those of all heads.
+    /// Mode of the first head; all heads have its name and step.
     pub mode: HeadMode,
     /// Smallest, mean and largest straight-line distance between neighbours of one turn, m.
     ///
-    /// It covers all heads, with the vehicle at its nominal pose and at rest. Source: the general case of Eq. 5, 6
-    /// and 10.
+    /// The figures cover all heads, with the vehicle at its nominal pose and at rest. Source: the general case of Eq.
+    /// 5, 6 and 10.
     pub chords_m: [f64; 3],
     /// The largest distance between neighbours of one turn on the unrolled wall, at any tolerated pose, m.
     pub t_y2_m: f64,
@@ -99,7 +101,7 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// Evaluates the wall from all tolerated poses.
+    /// Creates the planner by evaluating the wall from all tolerated poses.
     ///
     /// Errors: a layout that this number of heads can't have; a length, drift or yaw out of range; a head outside the
     /// profile at some pose, or a beam along the tunnel; heads without a common mode.
@@ -150,9 +152,10 @@ impl Planner {
         &self.modes
     }
 
-    /// Returns T_max at a speed with the heads phased for it, m: the largest over all tolerated poses.
+    /// Returns the largest T_max over all tolerated poses, with the heads phased for the speed, m.
     ///
-    /// It includes strips that the vehicle hides from some of its heads. Infinite if no head sees a strip.
+    /// The result includes strips that the vehicle hides from some of its heads. It is infinite if no head sees a
+    /// strip.
     ///
     /// Errors: a speed that isn't above zero.
     /// Source: Jorge et al. 2021, Eq. 16.
@@ -164,16 +167,16 @@ impl Planner {
         Ok(self.over_stances(mode, t_m).fold(0.0, f64::max))
     }
 
-    /// Returns the largest speed at which sections will pass, with the heads phased for it, m/s.
+    /// Returns the largest speed at which sections will pass, with the heads phased for that speed, m/s.
     ///
-    /// At that speed, T_max plus the margin for position errors equals the target.
+    /// T_max plus the margin for position errors then equals the target.
     ///
     /// Errors: a target that isn't above zero, or that no speed meets.
     pub fn v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
         let known_mps = self.known_v_max_mps(mode, target_m)?;
         let Some(planned) = self.modes.get(mode) else { return Ok(known_mps) };
-        // A slower vehicle takes longer between heads apart along the hull, so the margin grows. Starting from above,
-        // each speed leads to a lower one until it converges.
+        // At a lower speed, heads apart along the hull pass a place later after each other, so the margin is larger.
+        // The iteration starts from above, and each speed leads to a lower one until the speeds converge.
         let mut speed_mps = known_mps;
         for _ in 0..FALLS {
             let margin_m = self.margin_m(planned, target_m, speed_mps);
@@ -199,7 +202,7 @@ impl Planner {
         errors.pass_error_m(margin::error_time_s(passes_per_s, apart_m, speed_mps, APART_SHARE))
     }
 
-    /// Returns the largest speeds in a mode for a target, margin by margin.
+    /// Returns the largest speeds in a mode for a target as the margins are added one after the other.
     ///
     /// Errors: as for [`Planner::v_max_mps`].
     pub fn margins(&self, mode: usize, target_m: f64) -> Result<Margins, SamplingError> {
@@ -225,9 +228,9 @@ impl Planner {
         ))
     }
 
-    /// Returns the largest speed at which T_max equals the target, with the heads phased for it, m/s.
+    /// Returns the speed at which T_max equals the target, with the heads phased for it, m/s.
     ///
-    /// It is the inverse of [`Planner::t_max_m`], without position errors.
+    /// The function is the inverse of [`Planner::t_max_m`], without position errors.
     ///
     /// Errors: a target that isn't above zero, or that no speed meets.
     pub fn known_v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
@@ -265,7 +268,8 @@ impl Planner {
                 shift_m: stance.shift_m,
                 apart_m: stance.apart_m,
                 apart_swing_mps: swing_mps,
-                // From one tolerated yaw to the other; without a yaw tolerance, a yaw rate may last indefinitely.
+                // The swing is at most from one tolerated yaw to the other. Without a yaw tolerance, a yaw rate may
+                // last indefinitely.
                 swing_most_m: (yaw_rad > 0.0).then_some(2.0 * yaw_rad * stance.farthest_m),
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
@@ -274,7 +278,7 @@ impl Planner {
 
     /// Returns the longest times between passes at the nominal pose, s.
     ///
-    /// The first is over a place that all heads see, the second over any place that some head sees.
+    /// The first time is for places that all heads see, the second for places that at least one head sees.
     pub fn gaps_s(&self, mode: usize) -> Option<(f64, f64)> {
         let planned = self.modes.get(mode)?;
         let gap_s = |seen_by| planned.passes.gap_s(seen_by);
@@ -288,13 +292,13 @@ impl Planner {
         self.stances.first().map(|stance| &stance.strips)
     }
 
-    /// The longest range from any head to the wall: at the nominal pose, and at any tolerated pose, m.
+    /// The longest range from any head to the wall, m: at the nominal pose, and over all tolerated poses.
     pub fn farthest_m(&self) -> (f64, f64) {
         let far = || self.stances.iter().map(|stance| stance.farthest_m);
         (far().next().unwrap_or(0.0), far().fold(0.0, f64::max))
     }
 
-    /// Shortest and longest footprint of the first head on the wall in a turn, m.
+    /// Shortest and longest footprint of the first head's beam on the wall in a turn, m.
     ///
     /// Footprints are measured in the scan plane, at the nominal pose.
     ///
@@ -313,13 +317,13 @@ impl Planner {
         Ok(found)
     }
 
-    /// The farthest wall within the reach of every head, m.
+    /// The largest range to a wall that every head can detect, m.
     pub fn reach_m(&self) -> f64 {
         let reach = |(spec, _): &(HeadSpec, Vec<HeadMode>)| spec.reach_m(self.inspection.sound_speed_mps)[1];
         self.inspection.heads.iter().map(reach).fold(f64::INFINITY, f64::min)
     }
 
-    /// Angles hidden from each head, in its sensor frame.
+    /// Angles hidden from each head, in that head's sensor frame.
     pub fn hidden(&self) -> &[Vec<AngleRange>] {
         &self.hidden
     }
@@ -329,7 +333,7 @@ impl Planner {
         pose(&self.inspection, [0.0, 0.0], 0.0)
     }
 
-    /// The heads as set in a mode.
+    /// Returns the heads as set in a mode.
     pub fn specs(&self, mode: usize) -> Vec<HeadSpec> {
         let name = self.modes.get(mode).map(|planned| planned.mode.name);
         let of_head = |(spec, modes): &(HeadSpec, Vec<HeadMode>)| {
@@ -353,15 +357,16 @@ impl PlannedMode {
         self.ping_period_s
     }
 
-    /// Passes of the heads.
+    /// Passes of the heads in this mode.
     pub fn passes(&self) -> &Passes {
         &self.passes
     }
 }
 
-/// Returns the more severe of two errors: any other error, then an unseen strip, then a step.
+/// Returns the more severe of two errors.
 ///
-/// Within one kind, the larger one counts.
+/// An error of another kind is more severe than an unseen strip, and an unseen strip is more severe than a step.
+/// Between two errors of one kind, the larger value counts.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
     let weight = |why: &SamplingError| match why {
         SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),
@@ -371,7 +376,7 @@ fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingE
     known.filter(|known| weight(known) >= weight(&other)).or(Some(other))
 }
 
-/// For each mode that all heads have, the mode of each.
+/// Returns the modes that all heads have, each as a list with one entry per head.
 fn common_modes(heads: &[(HeadSpec, Vec<HeadMode>)]) -> Vec<Vec<HeadMode>> {
     let Some((_, first)) = heads.first() else { return Vec::new() };
     let of_all = |name: &str| -> Option<Vec<HeadMode>> {
@@ -380,7 +385,7 @@ fn common_modes(heads: &[(HeadSpec, Vec<HeadMode>)]) -> Vec<Vec<HeadMode>> {
     first.iter().filter_map(|mode| of_all(mode.name)).collect()
 }
 
-/// The nominal pose, then the other tolerated ones.
+/// Returns the nominal pose, followed by the other tolerated poses.
 fn poses(inspection: &Inspection) -> Vec<Pose> {
     let sides = |most: f64| if most > 0.0 { vec![0.0, -most, most] } else { vec![0.0] };
     let mut poses = Vec::new();
@@ -454,7 +459,7 @@ fn stance(
     })
 }
 
-/// The largest value less the smallest.
+/// The difference between the largest and the smallest value.
 fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
     (values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)).max(0.0)
 }

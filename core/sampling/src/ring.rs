@@ -1,6 +1,6 @@
 //! The general case by ray casting, for any profile and pose.
 //!
-//! It computes where the beams of a head at rest meet the wall.
+//! The functions compute the points where the beams of a head at rest meet the wall.
 
 use serde::{Deserialize, Serialize};
 
@@ -37,14 +37,14 @@ pub struct Sounding {
 /// Footprint of a beam on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
-    /// Extent in the head's scan plane, along the unrolled wall, m.
+    /// Extent of the footprint in the head's scan plane, along the unrolled wall, m.
     pub in_plane_m: f64,
-    /// Extent across that plane, m.
+    /// Extent of the footprint across the scan plane, m.
     pub across_m: f64,
 }
 
 impl<'a> Standing<'a> {
-    /// A head on a vehicle.
+    /// Creates a head on a vehicle.
     ///
     /// Errors: a head outside the profile.
     pub fn new(profile: &'a Profile, pose: &Pose, mount: &Mount) -> Result<Self, SamplingError> {
@@ -67,7 +67,7 @@ impl<'a> Standing<'a> {
         self.sounding_along(angle_rad, head_direction(angle_rad))
     }
 
-    /// As [`Standing::sounding`], with the direction of the beam already computed.
+    /// Returns the same as [`Standing::sounding`] for a beam whose direction is already known.
     fn sounding_along(&self, angle_rad: f64, beam: Vec3<Sensor>) -> Result<Sounding, SamplingError> {
         let direction = self.turn * beam;
         let hit = self.hit(direction);
@@ -78,8 +78,8 @@ impl<'a> Standing<'a> {
 
     /// Footprint of a beam of full width `beam_rad` about `angle_rad`.
     ///
-    /// In the scan plane, from one edge of the beam to the other along the unrolled wall; across it, between the edges
-    /// tilted ahead and astern.
+    /// In the scan plane, the footprint extends from one edge of the beam to the other along the unrolled wall.
+    /// Across this plane, it extends between the edges tilted ahead and astern.
     /// Errors: as for [`Standing::sounding`], for each edge; a width that isn't above zero.
     /// Source: Jorge et al. 2021, §9.2 and Fig. 15, for any wall.
     pub fn footprint(&self, angle_rad: f64, beam_rad: f64) -> Result<Footprint, SamplingError> {
@@ -109,14 +109,14 @@ impl<'a> Standing<'a> {
 }
 
 impl Sounding {
-    /// The range, m.
+    /// Range from the head to the wall, m.
     pub fn range_m(&self) -> f64 {
         self.beam.norm()
     }
 
     /// Distance to another sounding of the same head on the unrolled wall, m.
     ///
-    /// It is the shortest way round, the measure for holidays.
+    /// The distance is the shortest one around the perimeter. Holidays are measured by it.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
@@ -128,18 +128,18 @@ impl Sounding {
     }
 }
 
-/// Soundings of a whole turn at equal angles; its buffers are reused.
+/// Soundings of a whole turn at equal angles, with reusable buffers.
 #[derive(Debug, Clone, Default)]
 pub struct Ring {
     soundings: Vec<Sounding>,
-    /// Signed arc length from the first sounding to each, m; the last entry is that of the whole turn.
+    /// Signed arc lengths from the first sounding to each sounding, m, then that of the whole turn.
     ///
-    /// Negative if the head turns against arc length.
+    /// Values are negative if the head turns against arc length.
     way_m: Vec<f64>,
     perimeter_m: f64,
     /// Angles and beam directions of the soundings, cached between casts.
     beams: Vec<(f64, Vec3<Sensor>)>,
-    /// Stride of the distances cached in `steps_m`; zero if there are none.
+    /// Stride of the distances cached in `steps_m`; zero if no distances are cached.
     stride: usize,
     steps_m: Vec<f64>,
 }
@@ -156,10 +156,10 @@ impl Ring {
         Ok(ring)
     }
 
-    /// Recasts in place; after an error there are no soundings.
+    /// Recasts the ring in place; after an error the ring has no soundings.
     ///
     /// Errors: as for [`Ring::cast`].
-    /// Allocates: not when the ring has had as many soundings before.
+    /// Allocates: not if the ring has had as many soundings before.
     pub fn recast(
         &mut self,
         standing: &Standing<'_>,
@@ -193,7 +193,7 @@ impl Ring {
         Ok(())
     }
 
-    /// Computes the beam directions of a turn, unless they are those of the last cast.
+    /// Computes the beam directions of a turn, unless the last cast had the same directions.
     fn aim(&mut self, start_rad: f64, count: u32) {
         let from_rad = self.beams.first().map(|(angle_rad, _)| angle_rad.to_bits());
         if self.beams.len() == count as usize && from_rad == Some((start_rad + 0.0).to_bits()) {
@@ -206,7 +206,7 @@ impl Ring {
 
     /// Caches the distances between soundings `stride` apart until the next cast.
     ///
-    /// Allocates: not when the ring has had as many soundings before.
+    /// Allocates: not if the ring has had as many soundings before.
     pub fn keep_steps(&mut self, stride: usize) {
         if self.stride != stride {
             let mut steps_m = core::mem::take(&mut self.steps_m);
@@ -221,7 +221,7 @@ impl Ring {
         (self.stride == stride).then_some(self.steps_m.as_slice())
     }
 
-    /// Soundings per step, of `count` in a turn, rounded up; at least one.
+    /// Number of soundings per step for `count` soundings per turn, rounded up; at least one.
     pub fn stride(step_rad: f64, count: u32) -> usize {
         let soundings = -math::floor_to_i64(-(step_rad * f64::from(count) / TAU - 1e-6));
         usize::try_from(soundings.clamp(1, i64::from(count.max(1)))).unwrap_or(1)
@@ -232,7 +232,7 @@ impl Ring {
         self.perimeter_m
     }
 
-    /// Signed arc length of a whole turn, m: negative where the head turns against arc length.
+    /// Signed arc length of a whole turn, m: negative if the head turns against arc length.
     pub fn way_round_m(&self) -> f64 {
         self.way_m.last().copied().unwrap_or(0.0)
     }
@@ -242,9 +242,9 @@ impl Ring {
         &self.soundings
     }
 
-    /// Pairs of soundings `stride` apart, closing the turn.
+    /// Pairs of soundings `stride` apart, including the pairs that close the turn.
     ///
-    /// They are neighbours of a head that pings at every `stride`-th sounding.
+    /// A head that pings at every `stride`-th sounding has these pairs as neighbours.
     pub fn pairs(&self, stride: usize) -> impl Iterator<Item = (&Sounding, &Sounding)> {
         let count = self.soundings.len().max(1);
         self.soundings.iter().zip(self.soundings.iter().cycle().skip(stride % count))
@@ -252,7 +252,7 @@ impl Ring {
 
     /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart.
     ///
-    /// It covers any angle of the first ping. Zero without soundings.
+    /// The distance is the largest over all angles of the first ping. Zero without soundings.
     ///
     /// Source: Eq. 6 where the paper's assumptions hold.
     pub fn largest_step_m(&self, stride: usize) -> f64 {
@@ -261,7 +261,7 @@ impl Ring {
 
     /// Distances on the unrolled wall from each sounding to the one `stride` further, m.
     ///
-    /// They are in the direction of rotation. With one ping per turn it is the whole perimeter.
+    /// The distances follow the direction of rotation. With one ping per turn, the distance is the whole perimeter.
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
         let count = self.soundings.len().max(1);
         let whole_m = self.way_round_m();
@@ -270,7 +270,8 @@ impl Ring {
         self.pairs(stride).enumerate().map(move |(k, (a, b))| {
             let (to, turns) =
                 if k + rest < count { (k + rest, turns) } else { (k + rest - count, turns + 1) };
-            // The direct difference keeps its digits; the cumulative length gives the number of rounds, mostly zero.
+            // The direct difference has the smallest rounding error. The cumulative length gives the number of
+            // rounds, mostly zero.
             let short_m = math::wrap_signed(b.arc_m - a.arc_m, self.perimeter_m);
             let round_m = way_m(to) + whole_m * turns as f64 - way_m(k) - short_m;
             let rounds = if round_m.abs() < 0.4 * self.perimeter_m {

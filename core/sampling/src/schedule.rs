@@ -6,7 +6,7 @@ use super::layout::{self, HeadLayout, steps_over};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 
-/// Programs of real heads and the resulting angles.
+/// Programs of the heads, and the head angles that result from them.
 ///
 /// Heads step, ping at each step, and reverse at the ends of a sector. The last step is shorter if the sector is not
 /// a whole number of steps.
@@ -31,8 +31,8 @@ impl Schedule {
 
     /// Angle of a head at its last ping up to `since` the start, sensor frame, radians.
     ///
-    /// It is in [0, 2 pi) for continuous rotation, or within its sector. `None` for a head that does not exist, or
-    /// before the start.
+    /// The angle is in [0, 2 pi) for continuous rotation, or within the head's sector. `None` for a head that does
+    /// not exist, or before the start.
     pub fn angle_rad(&self, head: usize, since: DurNs) -> Option<f64> {
         let (spec, program) = self.heads.get(head)?;
         let since = (since >= DurNs::ZERO).then_some(since)?;
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn rotating_head_steps_with_each_ping() {
+    fn rotating_head_advances_one_step_per_ping() {
         let schedule = Schedule::new(&[head(120.0), head(120.0)], HeadLayout::PhaseShift, 0.0).unwrap();
         assert_eq!(angles_deg(&schedule, 0, 4), [0.0, 120.0, 240.0, 0.0]);
         assert_eq!(angles_deg(&schedule, 1, 3), [180.0, 300.0, 60.0]);
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn sector_with_a_partial_step_ends_with_a_short_one() {
+    fn last_step_of_a_sector_is_shorter_if_steps_do_not_divide_it() {
         let schedule = Schedule::new(&[head(75.0), head(75.0)], HeadLayout::SectorOffset, 0.0).unwrap();
         let there_and_back = [0.0, 75.0, 150.0, 180.0, 105.0, 30.0, 0.0, 75.0, 150.0, 180.0, 105.0];
         assert_eq!(angles_deg(&schedule, 0, 11), there_and_back);

@@ -1,8 +1,8 @@
 //! The paper's equations for one cross-section: a rotating head on a vehicle at rest.
 //!
-//! The paper writes them for a head midway between floor and crown of a tunnel of height b. They hold for any flat or
-//! circular wall and here take the distance to it: h = b / 2 in the paper's case. Angles are measured from the
-//! perpendicular to the flat wall.
+//! The paper states the equations for a head midway between floor and crown of a tunnel of height b. They hold for
+//! any flat or circular wall. The functions here take the distance h to the wall, which is b / 2 in the paper's case.
+//! Angles are measured from the perpendicular to the flat wall.
 
 use super::error::{SamplingError, not_negative, positive};
 use headrace_geometry::math;
@@ -18,10 +18,10 @@ pub fn t_y1_m(distance_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
 
 /// T_y2, m: the step along a flat wall from (m - 1) theta to m theta, for any m >= 1.
 ///
-/// It is the largest where m theta meets the corner. `distance_m` > 0 is the distance h to the wall. h (tan(m theta)
-/// - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)), which avoids cancellation.
-/// Multiples of theta are kept to twice double precision, so that a beam almost along the wall keeps its digits as
-/// well.
+/// The step is the largest where m theta meets the corner. `distance_m` > 0 is the distance h to the wall.
+/// The formula h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)),
+/// which avoids cancellation. Multiples of theta have twice double precision, so that a beam almost along the wall is
+/// as accurate.
 /// Errors: an argument out of range; m theta of 90 degrees or more.
 /// Source: Jorge et al. 2021, Eq. 6.
 pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingError> {
@@ -34,7 +34,7 @@ pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingErr
 
 /// T_c, m: the step along a circular wall for a head at its centre, the same everywhere on it.
 ///
-/// `radius_m` > 0 is the paper's b / 2; `step_rad` > 0 the step theta. The chord from sample to sample.
+/// The step is the chord between two samples. `radius_m` > 0 is the paper's b / 2; `step_rad` > 0 is the step theta.
 /// Errors: an argument out of range.
 /// Source: Jorge et al. 2021, Eq. 7 (b sin(theta / 2)).
 pub fn t_c_m(radius_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
@@ -45,8 +45,8 @@ pub fn t_c_m(radius_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
 
 /// Mean step along a flat wall from the foot of the perpendicular to m theta, m.
 ///
-/// Source: Jorge et al. 2021, Eq. 8, whose sum telescopes to Eq. 9: h tan(m theta) / m.
 /// Errors: as for [`t_y2_m`].
+/// Source: Jorge et al. 2021, Eq. 8, whose sum telescopes to Eq. 9: h tan(m theta) / m.
 pub fn t_y2_mean_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingError> {
     positive("the distance to the wall in metres", distance_m)?;
     positive("the step in radians", step_rad)?;
@@ -57,7 +57,7 @@ pub fn t_y2_mean_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, Sampli
 
 /// T_yp, m: upper bound of the mean step of a whole turn, perimeter / pings per turn.
 ///
-/// It holds for any head position.
+/// The bound holds for any head position.
 ///
 /// Errors: a perimeter or a number that isn't above zero.
 /// Source: Jorge et al. 2021, Eq. 10.
@@ -65,16 +65,16 @@ pub fn t_yp_m(perimeter_m: f64, steps: u32) -> Result<f64, SamplingError> {
     Ok(positive("the perimeter in metres", perimeter_m)? / positive("the steps of a turn", f64::from(steps))?)
 }
 
-/// epsilon: overlap of the beams of neighbouring pings (beam width / step); below 1 they don't overlap.
+/// epsilon: overlap of the beams of neighbouring pings (beam width / step).
 ///
-/// `beam_rad` is the beam's full width zeta, `step_rad` the step theta.
+/// Beams do not overlap below 1. `beam_rad` is the beam's full width zeta, `step_rad` the step theta.
 /// Errors: an argument that isn't above zero.
 /// Source: Jorge et al. 2021, Eq. 22.
 pub fn overlap(beam_rad: f64, step_rad: f64) -> Result<f64, SamplingError> {
     Ok(positive("the beam's width in radians", beam_rad)? / positive("the step in radians", step_rad)?)
 }
 
-/// eta, m: range resolution of a head: its span of ranges over the number of counts.
+/// eta, m: range resolution of a head: its span of ranges divided by the number of counts.
 ///
 /// Errors: no counts, a negative least range, or an empty span of ranges.
 /// Source: Jorge et al. 2021, §6.
@@ -135,7 +135,7 @@ fn above_zero(angle_rad: f64, cosine: f64) -> Result<f64, SamplingError> {
     meets.then_some(cosine).ok_or(SamplingError::BeamMissesWall { angle_deg: angle_rad.to_degrees() })
 }
 
-/// a b as a double, and its rounding error (Dekker's product).
+/// The product a b as a double, and its rounding error (Dekker's product).
 fn product(a: f64, b: f64) -> (f64, f64) {
     const SPLIT: f64 = 134_217_729.0;
     let halves = |x: f64| {
@@ -154,14 +154,14 @@ mod tests {
     use super::*;
     use headrace_geometry::math::{FRAC_PI_2, tan};
 
-    /// Near a right angle the cosine is as exact as the sum, which a double cannot represent.
+    /// The cosine of a sum is accurate near a right angle, although a double cannot represent the sum.
     ///
-    /// The reference is the sine of the remainder to a right angle, in two exact parts.
+    /// The reference is the sine of the difference from a right angle, in two exact parts.
     #[test]
-    fn cosine_of_a_sum_is_exact_up_to_a_grazing_beam() {
+    fn cosine_of_a_sum_is_accurate_up_to_a_grazing_beam() {
         const REST: f64 = 6.123_233_995_736_766e-17;
         for k in 35..60 {
-            // The difference from a right angle is exact from half of one on.
+            // For angles above half a right angle, the difference from a right angle is exact.
             let a_rad = 0.023 * f64::from(k);
             for left in [1e-3, 1e-6, 1e-9, 1e-12] {
                 let b_rad = FRAC_PI_2 - a_rad - left;
@@ -182,7 +182,7 @@ mod tests {
         assert!((t_yp_m(34.17, 400).unwrap() - 0.085_425).abs() < 1e-12);
         assert!((overlap(f64::to_radians(2.4), f64::to_radians(0.3)).unwrap() - 8.0).abs() < 1e-12);
         assert!((range_resolution_m(0.0, 10.0, 1000).unwrap() - 0.01).abs() < 1e-15);
-        // The paper's Fig. 15: up to some 25 cm at 10 m.
+        // The paper's Fig. 15 shows about 25 cm at 10 m.
         assert!((beam_width_m(10.0, f64::to_radians(1.4)).unwrap() - 0.244_358).abs() < 1e-6);
     }
 

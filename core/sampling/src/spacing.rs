@@ -6,8 +6,8 @@ use headrace_geometry::math;
 
 /// T_max, m: the longer diagonal of the parallelogram of four neighbouring samples.
 ///
-/// `t_x_m` is the distance between passes, `advance_m` (d) the distance travelled between two pings, `t_y_m` the
-/// largest distance between neighbours within a turn; all finite.
+/// `t_x_m` is the distance between passes, `advance_m` (d) the distance travelled between two pings, and `t_y_m` the
+/// largest distance between neighbours within a turn. All arguments are finite.
 /// Source: Jorge et al. 2021, Eq. 16.
 pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     math::hypot(t_x_m + advance_m, t_y_m)
@@ -15,8 +15,8 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
 
 /// The speed at which T_max equals the target, m/s.
 ///
-/// `None` where `t_y_m` alone reaches the target, or the times aren't positive. `pass_gap_s` is the time between
-/// passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between pings (T_s).
+/// `None` if `t_y_m` alone reaches the target, or the times aren't positive. `pass_gap_s` is the time between passes
+/// (T_rev / s for s evenly interleaved heads), `ping_period_s` the time between pings (T_s).
 /// Source: Eq. 16 solved for v (docs/decisions/0005-advice-and-plan.md).
 pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
     let time_s = pass_gap_s + ping_period_s;
@@ -25,7 +25,7 @@ pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_per
 
 /// Sum of pass distance and ping advance that the target T allows, m: sqrt(T^2 - T_y^2).
 ///
-/// `None` where `t_y_m` alone reaches the target.
+/// `None` if `t_y_m` alone reaches the target.
 pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
     // (T - t)(T + t) avoids cancellation for t close to T.
     (t_y_m < target_m).then(|| math::sqrt((target_m - t_y_m) * (target_m + t_y_m)))
@@ -43,11 +43,10 @@ impl Spiral {
     /// Creates the spiral.
     ///
     /// `passes_per_turn` is the number of passes over a place in the time of one turn: 1 for a single head, s for s
-    /// heads in phase shift, s / 2 for s heads in sectors.
+    /// heads in phase shift, s / 2 for s heads in sectors. At a speed of zero, all distances along the tunnel are
+    /// zero.
     ///
-    /// Errors: a negative speed, passes that are not positive, or a value that is not finite. A speed of zero is
-    /// valid:
-    /// all distances along the tunnel are zero.
+    /// Errors: a negative speed, passes that are not positive, or a value that is not finite.
     pub fn new(speed_mps: f64, turn: Turn, passes_per_turn: f64) -> Result<Self, SamplingError> {
         not_negative("the speed in m/s", speed_mps)?;
         positive("the number of passes in a turn", passes_per_turn)?;
@@ -80,16 +79,16 @@ impl Spiral {
         math::hypot(self.advance_m(), smallest_step_m)
     }
 
-    /// Mean step, m, from the mean step `t_yp_m` of a head at rest, as Eq. 15 is printed.
+    /// Mean step, m, from the mean step `t_yp_m` of a head at rest, as printed in Eq. 15.
     ///
-    /// (n d)^2 under its root combines a whole turn's advance with a single step; [`Spiral::t_y_mean_m`] uses the
-    /// advance of one step, so that both can be shown.
+    /// The term (n d)^2 under the root of Eq. 15 combines a whole turn's advance with a single step.
+    /// [`Spiral::t_y_mean_m`] uses the advance of one step, so that both values can be displayed.
     /// Source: Eq. 15.
     pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
     }
 
-    /// Mean step, m: that of a head at rest combined with the advance of one step.
+    /// Mean step, m: the mean step of a head at rest combined with the advance of one step.
     pub fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_yp_m)
     }

@@ -1,4 +1,4 @@
-//! Wall around a vehicle as strips seen by the same heads, and the spacing on them.
+//! Wall around a vehicle, divided into strips seen by the same heads, and the sample spacing on them.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,34 +24,36 @@ pub use limit::Going;
 pub use sector::{PARTS, Sector};
 pub use view::View;
 
-/// Strips narrower than this are rounding errors, m.
+/// Width below which a strip is a rounding error, m.
 const NO_WIDTH_M: f64 = 1e-9;
 
 /// A strip of the wall along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Strip {
-    /// Its arc on the perimeter.
+    /// Arc of the strip on the perimeter.
     pub arc: Arc,
-    /// The heads that see it.
+    /// The heads that see the strip.
     pub seen_by: HeadSet,
-    /// Whether any part of it is hidden from a head that would ping it.
+    /// Whether any part of the strip is hidden from a head that would otherwise ping it.
     ///
-    /// Pings then stop up to a step before its edge. If it is merely outside a sector, they stop at its edge.
+    /// Pings then stop up to a step before the strip's edge. If the strip is merely outside a sector, pings stop at
+    /// its edge.
     pub hidden: bool,
-    /// Longest wait between two passes, as a share of the longest anywhere: 0.5 to 1. The longest is at the ends of a
-    /// sector.
+    /// Longest time between two passes over the strip, as a share of the longest on any strip: 0.5 to 1.
+    ///
+    /// The time is the longest at the ends of a sector.
     pub wait: f64,
 }
 
 impl Strip {
-    /// Whether another strip differs only in its place.
+    /// Whether another strip differs from this one only in its place.
     fn is_like(&self, other: &Self) -> bool {
         let same_wait = (self.wait - other.wait).abs() <= 0.0;
         self.seen_by == other.seen_by && self.hidden == other.hidden && same_wait
     }
 }
 
-/// Largest speed for a target, and T_y at the place that limits it.
+/// Largest speed for a target, and T_y at the place that limits this speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
     /// The speed, m/s; infinite if nothing limits it.
@@ -63,39 +65,39 @@ pub struct Bound {
 /// A strip that misses a target at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
-    /// Longest time between two passes over it, s, without extra passes for lost returns.
+    /// Longest time between two passes over the strip, s, without extra passes for lost returns.
     ///
-    /// Infinite if no head sees it.
+    /// Infinite if no head sees the strip.
     pub gap_s: f64,
-    /// The largest step on it, m.
+    /// The largest step on the strip, m.
     pub t_y_m: f64,
-    /// Its length around the wall, m: the minimum distance between the samples on either side of it.
+    /// Width of the strip around the wall, m: the minimum distance between the samples on either side of it.
     pub width_m: f64,
 }
 
-/// Strips of the wall in order of arc length; one strip if all heads see everything.
+/// Strips of the wall in order of arc length; a single strip if all heads see all of the wall.
 ///
-/// Neighbouring strips are seen by different heads or after different waits. Holds the largest steps on each strip
-/// for several settings of the heads.
+/// Neighbouring strips differ in the heads that see them or in the time between passes. The largest steps on each
+/// strip are stored for several settings of the heads.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Strips {
     strips: Vec<Strip>,
     edges_m: Vec<f64>,
     perimeter_m: f64,
-    /// By setting and strip: largest step of the heads that see it, and of all heads, m.
+    /// Largest step of the heads that see a strip, and of all heads, m, by setting and strip.
     steps_m: Vec<[f64; 2]>,
-    /// By setting and strip: passes needed because of lost returns, within and across it.
+    /// Passes needed because of lost returns, within and across a strip, by setting and strip.
     ///
-    /// Empty before the first count.
+    /// Empty before the first call of `count_losses`.
     needed: Vec<[f64; 2]>,
-    /// Strip of each sounding of the current ring, and the approximate distance to that strip's end, m.
+    /// Strip of each sounding of the current ring, and the approximate distance to this strip's end, m.
     strip_of: Vec<(usize, f64)>,
 }
 
 stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, needed, strip_of; });
 
 impl Strips {
-    /// Creates it without strips, with capacity for those of `arcs` arcs in `settings` settings.
+    /// Creates an empty list with capacity for the strips of `arcs` arcs in `settings` settings.
     pub fn with_room(arcs: usize, settings: usize, soundings: u32) -> Self {
         let strips = 2 * arcs + 1;
         Self {
@@ -110,7 +112,7 @@ impl Strips {
 
     /// Builds the strips of these views, without steps.
     ///
-    /// Allocates: not with capacity for their sectors and hidden arcs.
+    /// Allocates: not if the capacity suffices for the views' sectors and hidden arcs.
     pub fn rebuild<'a>(&mut self, perimeter_m: f64, views: &'a [View]) {
         self.perimeter_m = perimeter_m;
         self.steps_m.clear();
@@ -143,7 +145,7 @@ impl Strips {
         self.join_at_the_seam();
     }
 
-    /// Joins the last strip and the first across the seam if they are alike.
+    /// Joins the last strip with the first one across the seam if they are alike.
     fn join_at_the_seam(&mut self) {
         let first = self.strips.first().copied();
         if self.strips.len() > 1
@@ -157,9 +159,9 @@ impl Strips {
 
     /// Measures the largest steps on each strip in `settings` settings of the heads.
     ///
-    /// `stride` returns the ring stride of a head's step by setting and head, `None` for an absent head.
+    /// `stride` returns the ring stride of a head's step by setting and head; `None` for an absent head.
     ///
-    /// Allocates: not with capacity for the settings.
+    /// Allocates: not if the capacity suffices for the settings.
     pub fn measure<'a>(
         &mut self,
         settings: usize,
@@ -215,7 +217,9 @@ impl Strips {
         self.strips.get(number_at(&self.strips, arc_m, self.perimeter_m))
     }
 
-    /// Returns a strip joined with its neighbours that the same heads see after other waits.
+    /// Returns the arc of a strip joined with its neighbours that the same heads see.
+    ///
+    /// The neighbours may have another time between passes.
     fn seen_alike(&self, k: usize) -> Arc {
         let count = self.strips.len();
         let Some(strip) = self.strips.get(k) else { return Arc { from_m: 0.0, length_m: 0.0 } };
@@ -226,7 +230,7 @@ impl Strips {
         Arc { from_m: strip.arc.from_m - back_m, length_m: (forward_m + back_m).min(self.perimeter_m) }
     }
 
-    /// Returns the largest step of any head on the strips that it sees, in a setting, m.
+    /// Returns the largest step in a setting, m, over all heads and the strips that they see.
     pub fn largest_step_m(&self, setting: usize) -> f64 {
         let count = self.strips.len();
         let of_setting = self.steps_m.iter().skip(setting * count).take(count);
@@ -235,14 +239,16 @@ impl Strips {
 
     /// Returns T_max predicted at a speed, m: the largest of any strip.
     ///
-    /// Infinite if no head sees a wide strip. Passes are farther apart on a strip that some heads do not see. But the
-    /// width of the strip also limits the distance between the samples on either side of it.
+    /// The result is infinite if no head sees a wide strip. Passes are farther apart on a strip that some heads do
+    /// not see. On a narrow strip, the samples on either side limit T as well.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)
     }
 
-    /// Returns the first strip that misses a target at a speed; `None` if [`Strips::t_max_m`] is within it.
+    /// Returns the first strip that misses a target at a speed.
+    ///
+    /// `None` if [`Strips::t_max_m`] meets the target.
     pub fn unmet(
         &self,
         setting: usize,
@@ -253,7 +259,7 @@ impl Strips {
     ) -> Option<Unmet> {
         let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
         let is_met = |limit: Limit| limit.t_m(speed_mps, going) <= target_m;
-        // The samples across a strip matter only if the strip itself misses the target.
+        // The samples on either side of a strip matter only if the strip itself misses the target.
         let is_unmet = |(k, strip): &(usize, &Strip)| {
             !(self.within(setting, (*k, strip), &thin).is_some_and(is_met)
                 || self.across(setting, (*k, strip), &thin).is_some_and(is_met))
@@ -268,7 +274,7 @@ impl Strips {
 
     /// Returns the largest speed for a target if every head saw all of the wall, m/s.
     ///
-    /// `None` if none meets it.
+    /// `None` if no speed meets the target.
     pub fn bound_if_all_seen_mps(
         &self,
         setting: usize,
@@ -304,9 +310,9 @@ impl Strips {
         })
     }
 
-    /// Returns the largest speed at which [`Strips::t_max_m`] meets a target, and its limiting T_y.
+    /// Returns the largest speed at which [`Strips::t_max_m`] meets a target, and the T_y that limits it.
     ///
-    /// The passes must be the same at any speed.
+    /// `passes` applies to all speeds.
     ///
     /// Errors: a strip on which no speed meets the target.
     pub fn bound_for_target(
@@ -342,7 +348,9 @@ impl Strips {
         Ok(slowest)
     }
 
-    /// Returns the limits of T for each strip: within it if any head sees it, and across it if not all do.
+    /// Returns two limits of T for each strip: within the strip, and between the samples beside it.
+    ///
+    /// The first is `None` if no head sees the strip. The second is `None` if the strip is not thin.
     fn limits(
         &self,
         setting: usize,
@@ -376,7 +384,7 @@ impl Strips {
 
     /// Returns the distance between the samples on either side of the thin strips around strip `k`, m.
     ///
-    /// Also returns whether these strips are merely the part that sectors leave out.
+    /// Also returns whether sectors alone leave these strips out.
     fn across_m(&self, setting: usize, k: usize, gaps: &Thin<'_>) -> (f64, bool) {
         let count = self.strips.len();
         let thin = |number: usize| {
@@ -393,7 +401,7 @@ impl Strips {
             is_left_out &= strip.seen_by.is_empty() && !strip.hidden;
             step_m = step_m.max(self.steps_m.get(setting * count + number).map_or(0.0, |steps| steps[1]));
         }
-        // Pings end at the edge of a sector, but up to a step before a hidden arc.
+        // Pings end at the edge of a sector, but up to a step before the edge of a hidden arc.
         (width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }, is_left_out)
     }
 }
@@ -404,11 +412,11 @@ struct Reached {
     arc_m: f64,
     strip: usize,
     forward: bool,
-    /// Whether it certainly ends in the strip in which it begins.
+    /// Whether the step certainly ends in the strip in which it begins.
     is_within: bool,
 }
 
-/// Records a step on every strip that it touches or crosses, however narrow.
+/// Records a step on every strip that it touches or crosses, even on the narrowest one.
 fn note_step(
     strips: &[Strip],
     steps_m: &mut [[f64; 2]],
@@ -468,7 +476,9 @@ fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
     }
 }
 
-/// [`number_at`] with a guess that is mostly right, because soundings are in order around the wall.
+/// Returns the number of the strip at an arc length, given a guess.
+///
+/// The guess is mostly right, because soundings are in order around the wall. See [`number_at`].
 fn number_near(strips: &[Strip], arc_m: f64, perimeter_m: f64, guess: usize) -> usize {
     let first_m = strips.first().map_or(0.0, |strip| strip.arc.from_m);
     let from_first_m = math::wrap(arc_m - first_m, perimeter_m);
@@ -479,7 +489,7 @@ fn number_near(strips: &[Strip], arc_m: f64, perimeter_m: f64, guess: usize) -> 
     strips.iter().rposition(|strip| strip.arc.from_m - first_m <= from_first_m).unwrap_or(0)
 }
 
-/// Returns the number of the strip at an arc length: the last that begins at or before it.
+/// Returns the number of the last strip that begins at or before an arc length.
 fn number_at(strips: &[Strip], arc_m: f64, perimeter_m: f64) -> usize {
     number_near(strips, arc_m, perimeter_m, strips.len())
 }

@@ -5,29 +5,31 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of stored headings: at 5 Hz, `WINDOW` plus one turn of a head in its slowest mode.
+/// Number of stored directions: at 5 Hz, `WINDOW` plus one turn of a head in its slowest mode.
 const BEATS: usize = 320;
-/// History in which a swing counts.
+/// Length of the history in which a swing counts.
 ///
-/// A swing with a period of up to a minute shows its full extent in half of it.
+/// A swing with a period of up to a minute reaches its full extent within half a minute.
 const WINDOW: DurNs = DurNs(30_000_000_000);
-/// Rotation between two passes below which it is attributed to navigation errors, radians.
+/// Largest rotation between two passes that is attributed to navigation errors, radians.
 ///
-/// It counts fully from twice this.
+/// A rotation counts fully from twice this value.
 const DEAD_RAD: f64 = 0.0075;
 
 /// Swing of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Swing {
-    /// Largest rotation between two passes, per second, rad/s.
+    /// Largest rotation between two passes, divided by the time between them, rad/s.
     pub rate_radps: f64,
-    /// Largest rotation over any time, radians.
+    /// Largest rotation over any time within the history, radians.
     pub most_rad: f64,
-    /// Largest rotation until the rearmost head reaches the position of the foremost, per second, rad/s.
+    /// Largest rotation between two heads apart along the hull, divided by the time between them, rad/s.
+    ///
+    /// The time ends when the rearmost head reaches the position of the foremost.
     pub apart_rate_radps: f64,
 }
 
-/// Recent directions of the vehicle's x axis.
+/// History of the directions of the vehicle's x axis.
 #[derive(Debug, Clone)]
 pub struct Looks {
     looks: Vec<(MonoNs, Vec3<Tunnel>)>,
@@ -64,8 +66,8 @@ impl Looks {
 
     /// Returns the largest swing of the last half minute up to `now`.
     ///
-    /// It stays valid while the vehicle swings to and fro. `gap_s` is the time between passes; heads pass a place
-    /// within `apart_s`. Rotation within the navigation errors is excluded, with a continuous transition.
+    /// The result persists while the vehicle swings to and fro. `gap_s` is the time between passes; all heads pass a
+    /// place within `apart_s`. Rotation within the navigation errors is excluded, with a continuous transition.
     /// Allocates: never.
     pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing {
         let rate = |over_s: f64| {
@@ -83,18 +85,18 @@ impl Looks {
         Swing { rate_radps, most_rad: counted(largest_rad) * most_rad, apart_rate_radps }
     }
 
-    /// Returns the largest rotation over a time within the last half minute, radians.
+    /// Returns the largest rotation over a duration within the last half minute, radians.
     fn turned_over(&self, now: MonoNs, over_s: f64) -> f64 {
         let over = DurNs::from_secs_f64(over_s.min(1e3));
         let oldest = self.newest_first().last().map(|(_, look)| *look);
         let mut turned_rad = 0.0_f64;
         let mut earlier = self.newest_first().peekable();
         for (at, look) in self.recent(now) {
-            // Both move back in time, so that `earlier` never has to be rewound.
+            // Both iterators move back in time, so `earlier` never has to be rewound.
             while earlier.peek().is_some_and(|(then, _)| at.since(*then).0 < over.0) {
                 earlier.next();
             }
-            // If the time extends beyond the history, the oldest direction is used.
+            // If the duration exceeds the history, the oldest direction is used.
             let before = earlier.peek().map(|(_, before)| *before).or(oldest);
             turned_rad = turned_rad.max(before.map_or(0.0, |before| (*look + -before).norm()));
         }
@@ -122,7 +124,7 @@ mod tests {
 
     const BEAT: i64 = 200_000_000;
 
-    /// Directions of a vehicle with this yaw and pitch, radians, as functions of time in s.
+    /// Directions of a vehicle whose yaw and pitch, radians, are functions of time in s.
     fn looks(seconds: f64, yaw_pitch: impl Fn(f64) -> [f64; 2]) -> (Looks, MonoNs) {
         let mut looks = Looks::default();
         let mut at = MonoNs(7 * BEAT as u64);
@@ -135,12 +137,12 @@ mod tests {
     }
 
     #[test]
-    fn steady_swing_is_measured_and_persists_between_reversals() {
+    fn steady_swing_has_its_full_rate_and_extent_at_any_time() {
         let swinging = |t: f64| [0.1 * math::sin(TAU * t / 20.0), 0.0];
         for seconds in [60.0, 63.0, 65.0, 68.4, 200.0] {
             let (looks, now) = looks(seconds, swinging);
             let swing = looks.swing(now, 2.0, 0.0);
-            // Between two passes a sine turns by at most 2 A sin(omega t / 2).
+            // Between two passes, a sine with the amplitude A turns by at most 2 A sin(omega t / 2).
             let expected = 0.2 * math::sin(TAU * 2.0 / 40.0) / 2.0;
             assert!((swing.rate_radps / expected - 1.0).abs() < 0.01, "{seconds}: {swing:?}, {expected}");
             assert!((swing.most_rad / 0.2 - 1.0).abs() < 0.01, "{swing:?}");
@@ -149,7 +151,7 @@ mod tests {
 
     #[test]
     fn slow_swing_counts_between_heads_apart_along_the_hull() {
-        // The rotation is within the dead band between passes, but not over ten seconds.
+        // The rotation between passes is within the navigation errors, but the rotation over ten seconds is not.
         let (looks, now) = looks(80.0, |t| [0.02 * math::sin(TAU * t / 50.0), 0.0]);
         let swing = looks.swing(now, 2.0, 10.0);
         let expected = 0.04 * math::sin(TAU * 10.0 / 100.0) / 10.0;
@@ -177,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn swing_sets_in_continuously_and_counts_fully() {
+    fn swing_counts_fully_above_a_continuous_transition() {
         let ramp = |rad: f64| {
             let (looks, now) = looks(40.0, move |t| [rad * math::sin(TAU * t / 4.0), 0.0]);
             looks.swing(now, 2.0, 0.0).rate_radps * 2.0
@@ -193,10 +195,10 @@ mod tests {
     }
 
     #[test]
-    fn pitch_counts_like_yaw_and_long_gaps_use_the_available_history() {
+    fn pitch_counts_like_yaw_and_long_gaps_use_the_oldest_direction() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
-        // From the oldest stored direction to the one farthest from it.
+        // The largest rotation is from the oldest stored direction to the one farthest from it.
         let turned_rad = looks.swing(now, 60.0, 0.0).rate_radps * 60.0;
         assert!((turned_rad - 0.09).abs() < 0.01, "{turned_rad}");
         assert_eq!(looks.swing(now, f64::NAN, 0.0), Swing::default());

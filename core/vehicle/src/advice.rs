@@ -8,12 +8,12 @@ use headrace_sampling::advice::Looks;
 
 /// Allowed angles between the rays of a ring, degrees.
 ///
-/// The finest is that of `plan`. Beyond the coarsest, every mode's steps would be rounded.
+/// The finest angle is that of `plan`. With an angle above 1 degree, the steps of every mode would be rounded.
 const RING_DEG: RangeInclusive<f64> = 0.1..=1.0;
 /// Allowed movement across the tunnel before a ring is recast, m.
 const LOOK_M: RangeInclusive<f64> = 0.001..=0.1;
 
-/// Reads the table.
+/// Reads the `[advice]` table.
 ///
 /// Errors: a key that is unknown or out of range.
 pub(super) fn parse_looks(section: &Section<'_>) -> Result<Looks, ConfigError> {

@@ -25,7 +25,7 @@ impl AlertClass {
     pub const ALL: [Self; 6] =
         [Self::Coverage, Self::Speed, Self::Position, Self::Sensor, Self::Recording, Self::Setting];
 
-    /// The word for it in files and JSON.
+    /// Name of the class in files and JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Coverage => "coverage",
@@ -41,9 +41,9 @@ impl AlertClass {
 /// Delays before an alert becomes active and before it clears.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClassTiming {
-    /// Time that the situation must last before the alert becomes active.
+    /// Duration of the situation before the alert becomes active.
     pub hold: DurNs,
-    /// Time that the situation must be absent before the alert clears.
+    /// Duration without the situation before the alert clears.
     pub off: DurNs,
 }
 
@@ -51,13 +51,14 @@ pub struct ClassTiming {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AlertTiming([ClassTiming; AlertClass::ALL.len()]);
 
-/// Longest time of a class, seconds.
+/// Maximum delay of a class, seconds.
 const MOST_S: f64 = 600.0;
 
 impl Default for AlertTiming {
-    /// Speed and position fluctuate about their limits within seconds.
+    /// Default delays.
     ///
-    /// The other classes have their own hysteresis.
+    /// Speed and position fluctuate about their limits within seconds, so their alerts are delayed. The other classes
+    /// have their own hysteresis.
     fn default() -> Self {
         let timing = |hold_s: f64, off_s: f64| ClassTiming {
             hold: DurNs::from_secs_f64(hold_s),
@@ -86,7 +87,7 @@ impl AlertTiming {
         }
     }
 
-    /// Returns the timing with that of one class replaced.
+    /// Returns the timing with the delays of one class replaced.
     #[must_use]
     pub fn with(mut self, class: AlertClass, timing: ClassTiming) -> Self {
         if let Some(slot) = self.0.get_mut(class as usize) {
@@ -147,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn class_timing_is_set_by_name_and_others_keep_defaults() {
+    fn timing_is_set_for_the_named_class_only() {
         let all = timing("speed.hold_s = 2.5\n[position]\noff_s = 0\n").unwrap();
         let usual = AlertTiming::default();
         let speed = ClassTiming { hold: DurNs(2_500_000_000), ..usual.of(AlertClass::Speed) };

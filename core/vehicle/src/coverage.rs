@@ -10,15 +10,15 @@ use headrace_geometry::tunnel::Profile;
 /// Parameters for the verdicts on the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoverageConfig {
-    /// Maximum width of a hole's bounds, m; zero for the exact search.
+    /// Maximum width of the bounds on a hole's size, m; zero for the exact search.
     pub hole_tolerance_m: f64,
-    /// Deviation from the design profile that contradicts it, m.
+    /// Deviation from the design profile above which a sample contradicts the profile, m.
     ///
     /// A section cannot pass if most of its samples contradict the profile.
     pub contradiction_m: f64,
-    /// Node edge of the sounding grid, m.
+    /// Edge length of a node of the sounding grid, m.
     pub node_m: f64,
-    /// Standard deviations of D between hole and target for a verdict of pass or fail: 1, 2 or 3.
+    /// Number of standard deviations of D between hole and target that a verdict requires: 1, 2 or 3.
     pub confidence_sd: f64,
     /// Declared openings of the wall.
     pub openings: Vec<Opening>,
@@ -36,25 +36,26 @@ impl Default for CoverageConfig {
     }
 }
 
-/// Limits of the contradicting deviation.
+/// Default limit of the deviation from the profile: a share of the radius, but at most 0.5 m.
 ///
-/// They are a share of the radius of a circle with the same perimeter, and a maximum, m.
+/// The radius is that of a circle with the profile's perimeter.
 const CONTRADICTION_SHARE: f64 = 0.2;
 const MOST_CONTRADICTION_M: f64 = 0.5;
-/// Maximum number of samples that fill openings.
+/// Maximum number of places that stand for samples on all openings together.
 const MAX_PLACES: i64 = 1_000_000;
 
 impl CoverageConfig {
-    /// Returns the default deviation that contradicts a profile of this perimeter, m.
+    /// Returns the default deviation above which a sample contradicts a profile of this perimeter, m.
     ///
-    /// It exceeds a lining, or a design that is 6 % off, and is less than the difference to another tunnel.
+    /// The value is larger than a lining, or the error of a design that is 6 % off. It is smaller than the difference
+    /// from another tunnel.
     pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
     /// Reads both tables from the root of a vehicle file.
     ///
-    /// Profile or target are `None` if they are wrong in the file; the tables are then checked as far as possible.
+    /// `profile` or `target_m` is `None` if it is wrong in the file; the tables are then checked as far as possible.
     ///
     /// Errors: a key that is missing, unknown or out of range.
     pub(super) fn of_root(
@@ -119,9 +120,9 @@ fn parse_opening(section: &Section<'_>, profile: Option<&Profile>) -> Result<Ope
     Ok(Opening { name, from_m, to_m, arc_m })
 }
 
-/// Arc length of a clock position, m, seen from the reference point along the tunnel.
+/// Arc length of a clock position, m.
 ///
-/// 6 is the floor, 9 the left wall.
+/// The clock is seen from the reference point, looking along the tunnel: 6 is the floor, 9 the left wall.
 fn arc_at_hour_m(profile: &Profile, hour: f64) -> f64 {
     let angle = (hour - 6.0) / 12.0 * TAU;
     let direction = [math::sin(angle), -math::cos(angle)];
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn confidence_is_1_2_or_3_sd() {
+    fn confidence_is_1_2_or_3_standard_deviations() {
         let confidence_sd = |text: &str| parsed(text).unwrap().confidence_sd;
         let whole = |value: f64| headrace_geometry::math::round_to_i64(value);
         assert_eq!(whole(confidence_sd("")), 2);

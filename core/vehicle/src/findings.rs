@@ -1,6 +1,6 @@
-//! Checks of a readable vehicle file as a whole.
+//! Checks of a vehicle file as a whole, after its keys have been read.
 //!
-//! They find lines that cannot be shared, walls out of reach, and heads out of step.
+//! The checks find connections that cannot be shared, walls out of reach, and heads out of step.
 
 use core::fmt;
 
@@ -18,20 +18,20 @@ use crate::VehicleConfig;
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grade {
-    /// It cannot work as written.
+    /// The file cannot work as written.
     Error,
-    /// It works, but at a cost, or only if it is intended.
+    /// The file works, but at a cost, or only if the setting is intended.
     Warning,
 }
 
 /// A problem in a file whose keys are valid individually.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
-    /// Whether it is an error.
+    /// Severity of the finding.
     pub grade: Grade,
     /// Dotted path of the key, which may be absent from its table.
     pub key: String,
-    /// The problem, and what to do.
+    /// The problem, and what to do about it.
     pub problem: String,
 }
 
@@ -41,27 +41,27 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Number of beams of a turn that are checked.
+/// Number of beams per turn that are checked.
 const BEAMS: u32 = 720;
 /// Minimum share of the wall that a head must reach.
 ///
-/// Otherwise its range setting or the tunnel is wrong.
+/// If the share is lower, the range setting or the tunnel is wrong.
 const LEAST_SHARE: f64 = 0.5;
 /// Relative difference of turn durations below which heads stay in step for hours.
 const SAME_TURN: f64 = 1e-6;
 /// Finest range step of a sonar, m: that of an 881L set to 5 m or less (Imagenex 881L data sheet).
 ///
-/// No return resolves finer detail of a wall.
+/// No return resolves finer details of a wall.
 const FINEST_M: f64 = 0.002;
 /// Edge length that approximates a wall's curve to within [`FINEST_M`] at any radius, m.
 ///
-/// The sagitta e^2 / (8 r) is 0.1 mm in the narrowest pipe, of 0.1 m.
+/// The sagitta e^2 / (8 r) is 0.1 mm in the narrowest pipe, whose radius is 0.1 m.
 const ENOUGH_M: f64 = 0.01;
 /// Distance along the hull below which heads are side by side, m.
 const APART_M: f64 = 0.01;
 
 impl VehicleConfig {
-    /// Returns all findings: by sensor, then on the heads together, then on the tunnel.
+    /// Returns all findings, ordered by subject: single sensors, all heads together, the tunnel.
     pub fn findings(&self) -> Vec<Finding> {
         let mut found = self.connections();
         found.extend(self.remarks());
@@ -71,7 +71,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Returns sensors that cannot share the line of an earlier one, with the reason.
+    /// Returns the sensors that cannot share the connection of an earlier sensor, each with the reason.
     pub fn excluded_from_lines(&self) -> Vec<(usize, String)> {
         let mut found = Vec::new();
         let mut before: Vec<(usize, Connect)> = Vec::new();
@@ -87,7 +87,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Returns connections that do not parse, or that another one excludes.
+    /// Returns the connections that do not parse, or that conflict with the connection of an earlier sensor.
     fn connections(&self) -> Vec<Finding> {
         let mut found = Vec::new();
         let mut before: Vec<(usize, Connect)> = Vec::new();
@@ -118,7 +118,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Returns why two sensors cannot have these connections; `None` if they can.
+    /// Returns the reason why two sensors cannot have these connections; `None` if they can.
     fn exclude(&self, a: usize, of_a: &Connect, b: usize, of_b: &Connect) -> Option<(Grade, String)> {
         let other = self.sensor_configs.get(a)?;
         let own = self.sensor_configs.get(b)?;
@@ -131,7 +131,7 @@ impl VehicleConfig {
             return Some((Grade::Error, problem));
         }
         if other.plugin != own.plugin {
-            // Frames on CAN have identifiers, so devices can share the bus.
+            // Frames on CAN have identifiers, so different devices can share the bus.
             let shared = matches!(of_a, Connect::Can { .. });
             let problem = format!(
                 "is the {end} of sensor {:?}, a {}; each gets the other's bytes, too, and skips them",
@@ -157,7 +157,7 @@ impl VehicleConfig {
         })
     }
 
-    /// Returns heads that do not reach the wall from the centre of the tunnel.
+    /// Returns the heads that do not reach all of the wall from the centre of the tunnel.
     fn reaches(&self) -> Vec<Finding> {
         let heads = self.heads();
         let hidden = occlusion::hidden_by_vehicle(&heads, &self.hull);
@@ -196,7 +196,7 @@ impl VehicleConfig {
         Some(Finding { grade, key: format!("sensors[{number}].range_m"), problem })
     }
 
-    /// Returns profile points that are closer together than any sonar resolves.
+    /// Returns a warning if profile points are closer together than any sonar resolves.
     fn too_fine(&self) -> Option<Finding> {
         let tunnel = &self.tunnel;
         if tunnel.name != "polyline" {
@@ -221,7 +221,7 @@ impl VehicleConfig {
         Some(warning("tunnel.file".to_owned(), problem))
     }
 
-    /// Returns heads whose passes cannot interleave.
+    /// Returns warnings about heads whose passes cannot interleave.
     fn interleaving(&self) -> Vec<Finding> {
         let heads = self.heads();
         let mut found = Vec::new();
@@ -261,7 +261,7 @@ fn warning(key: String, problem: String) -> Finding {
     Finding { grade: Grade::Warning, key, problem }
 }
 
-/// Names the common end of both connections; `None` if they lead to different ends.
+/// Names the end that both connections share; `None` if they lead to different ends.
 fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
     match (a, b) {
         (Connect::Serial { port: a, .. }, Connect::Serial { port: b, .. }) => {
@@ -286,7 +286,7 @@ struct Wall {
 }
 
 impl Wall {
-    /// Returns `None` if the beam runs along the tunnel.
+    /// Returns the point where a beam meets the wall; `None` if the beam runs along the tunnel.
     fn at(standing: &Standing<'_>, angle_rad: f64) -> Option<Self> {
         let sounding = standing.sounding(angle_rad).ok()?;
         Some(Self { range_m: sounding.range_m(), arc_m: sounding.arc_m })
@@ -319,7 +319,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn same_end_is_recognised_in_any_notation() {
+    fn connections_to_one_end_are_recognised_in_any_notation() {
         let parse = |text: &str| Connect::parse(text).unwrap();
         for (a, b, expected) in [
             ("serial:/dev/a?baud=9600", "serial:/dev/a", Some("serial port")),

@@ -5,9 +5,9 @@ use headrace_sampling::plan::Inspection;
 use crate::VehicleConfig;
 
 impl VehicleConfig {
-    /// Returns the inspection of its tunnel by its heads as configured, steady in the centre.
+    /// Returns the inspection with the heads as configured and the vehicle steady in the centre.
     ///
-    /// Errors: a message about a head's range setting without modes.
+    /// Errors: no modes are known for a head's range setting.
     pub fn inspection(&self) -> Result<Inspection, String> {
         let heads = self.sensors.iter().filter_map(|sensor| Some((sensor.head()?, sensor.modes(None))));
         let heads = heads.map(|(spec, modes)| Ok((spec, modes?))).collect::<Result<_, String>>()?;

@@ -10,24 +10,24 @@ use headrace_sampling::occlusion::Obstacle;
 use crate::alerts::{AlertTiming, LimitsConfig};
 use crate::coverage::CoverageConfig;
 
-/// Mission parameters of a loop.
+/// Mission parameters of a dive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
     /// Design profile.
     pub profile: Profile,
-    /// Water, gravity, levels.
+    /// Water, gravity and levels.
     pub site: Site,
-    /// Depth sensor whose temperature gives the speed of sound, in place of the site's.
+    /// Depth sensor whose temperature determines the speed of sound, instead of the site's value.
     pub sound_speed_from: Option<String>,
     /// Target T, m.
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Length of the tunnel, m; samples beyond are counted but not kept.
+    /// Length of the tunnel, m; samples beyond it are counted but not stored.
     pub length_m: f64,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
-    /// Speed for which the heads are put in phase, m/s; zero if none is planned.
+    /// Speed for which the heads' phases are planned, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head, other than the other heads.
     pub hull: Vec<Obstacle>,
@@ -35,7 +35,7 @@ pub struct Mission {
     pub coverage: CoverageConfig,
     /// Resolution and update rate of the advice's view of the wall.
     pub looks: Looks,
-    /// Time limit of the dive from its first packet; `None` if not set.
+    /// Time limit of the dive, counted from the first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
     /// Timing of alerts by class.
     pub alerts: AlertTiming,
@@ -46,7 +46,8 @@ pub struct Mission {
 impl Mission {
     /// Creates a mission with defaults.
     ///
-    /// Tunnel of 100 m with sections of 0.25 m at the default site; phase shift, no hull, exact holes, no time limit.
+    /// The tunnel is 100 m long, with sections of 0.25 m at the default site. The layout is phase shift; there are no
+    /// hull parts and no time limit, and holes are computed exactly.
     pub fn new(profile: Profile, target_m: f64) -> Self {
         let contradiction_m = CoverageConfig::usual_contradiction_m(profile.perimeter_m());
         Self {
@@ -67,7 +68,9 @@ impl Mission {
         }
     }
 
-    /// Whether pings land on the same wall places as in another mission: same tunnel, water, layout and hull.
+    /// Whether pings land on the same wall places as in another mission.
+    ///
+    /// True if tunnel, water, layout and hull are the same.
     pub fn places_as(&self, other: &Self) -> bool {
         self.profile == other.profile
             && self.site == other.site

@@ -14,15 +14,17 @@ use headrace_sensor::device::{CounterSpec, InertialNoise};
 
 /// One degree, radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// Allowed noise settings. Zero is excluded, because the filter would trust one sensor over all others.
+/// Allowed noise settings.
+///
+/// Zero is excluded, because the filter would trust one sensor over all others.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
-/// Allowed lengths of an epoch, and of a window within the filter's buffers, s.
+/// Allowed lengths of an epoch and of a window, s; the filter's buffers suffice for both.
 ///
-/// With epochs of 0.5 s the estimate of a field dive was off by metres; with 0.2 s by no more than with 0.1 s
-/// (Navigation trade of `headrace cost`).
+/// With epochs of 0.5 s, the estimate of a field dive was off by metres. With 0.2 s, the error was no larger than
+/// with 0.1 s (Navigation trade of `headrace cost`).
 const EPOCH_S: RangeInclusive<f64> = 0.02..=0.2;
 const WINDOW_S: RangeInclusive<f64> = 0.1..=1.0;
 
@@ -30,16 +32,16 @@ const WINDOW_S: RangeInclusive<f64> = 0.1..=1.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "there is one of it")]
 pub enum NavigationConfig {
-    /// The filter.
+    /// The navigation filter with its settings.
     Filter(Settings),
-    /// The method without a filter.
+    /// Direct navigation, without a filter.
     Direct,
 }
 
 impl NavigationConfig {
-    /// Reads the table; without a table, it is the filter.
+    /// Reads the table; the default is the filter.
     ///
-    /// For missing keys it uses the inertial unit's `noise` and the cable `counter` if they are known, and defaults
+    /// Missing keys take the inertial unit's `noise` and the cable `counter` if these are known, and the defaults
     /// otherwise.
     ///
     /// Errors: the first key that is unknown or out of range.
@@ -58,7 +60,7 @@ impl NavigationConfig {
         Ok(if by_filter { Self::Filter(settings) } else { Self::Direct })
     }
 
-    /// Creates the navigation in its initial state.
+    /// Creates the navigation with its initial state.
     pub fn begin(&self, profile: &Profile, site: Site) -> Box<dyn Navigation> {
         match self {
             Self::Filter(settings) => Box::new(FilterNavigation::new(profile.clone(), site, *settings)),

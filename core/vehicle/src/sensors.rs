@@ -8,12 +8,12 @@ use headrace_geometry::time::DurNs;
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::{Device, DeviceKind};
 
-/// Allowed distance of a sensor from the body's origin in each axis, m.
+/// Allowed coordinates of a sensor in the body frame, m.
 pub(super) const SENSOR_DISTANCE_M: RangeInclusive<f64> = -20.0..=20.0;
-/// Allowed angles.
+/// Allowed angles, degrees.
 pub(super) const DEGREES: RangeInclusive<f64> = -360.0..=360.0;
 
-/// Sensors of a file, in its order.
+/// Sensors of a file, in the order of the file.
 #[derive(Default)]
 pub(super) struct Sensors {
     pub(super) devices: Vec<Box<dyn Device>>,
@@ -22,7 +22,7 @@ pub(super) struct Sensors {
 
 /// Reads all sensor tables; `None` if one of them has an error.
 ///
-/// Errors: there is no table, or the first wrong one if errors are not collected.
+/// Errors: there is no table; or, if errors are not collected, the first wrong table.
 pub(super) fn parse(
     root: &Section<'_>,
     tables: Vec<Section<'_>>,
@@ -45,7 +45,7 @@ pub(super) fn parse(
     Ok(complete.then_some(sensors))
 }
 
-/// Reads a sensor's table; `ids` are those of earlier sensors.
+/// Reads a sensor's table; `ids` contains the ids of earlier sensors.
 fn parse_sensor(
     section: &Section<'_>,
     ids: &mut Vec<String>,
@@ -84,7 +84,7 @@ fn parse_sensor(
 /// Id of the operator's input, which is recorded like a sensor.
 pub const CONSOLE_ID: &str = "console";
 
-/// Returns the problem of an id, if any.
+/// Returns the problem with an id, if any.
 fn id_problem(id: &str, ids: &[String]) -> Option<&'static str> {
     let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if id.is_empty() || id.len() > 32 || !id.chars().all(simple) {

@@ -16,7 +16,7 @@ pub struct TunnelConfig {
 }
 
 impl TunnelConfig {
-    /// Reads a tunnel's table, without the keys that concern the site.
+    /// Reads a tunnel's table, except the keys that concern the site.
     ///
     /// Errors: a key that is missing, unknown or out of range, or dimensions without a valid profile.
     pub fn from_section(section: &Section<'_>, load: Loader<'_>) -> Result<Self, ConfigError> {
@@ -105,9 +105,10 @@ fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profil
 /// Maximum number of points of a profile: one per millimetre of a wall of 100 m.
 const MOST_POINTS: usize = 100_000;
 
-/// Reads a polyline: one line `y_m,z_m` per vertex. Returns the vertices with their line numbers.
+/// Reads a polyline with one line `y_m,z_m` per vertex.
 ///
-/// It skips a first line of other text, and lines that start with #.
+/// Returns the vertices with their line numbers. The function skips lines that start with #, and a first line that is
+/// no vertex.
 fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
     let (mut points, mut lines) = (Vec::new(), Vec::new());
     for (number, line) in text.lines().enumerate() {
@@ -139,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn polyline_error_names_the_line() {
+    fn polyline_has_line_numbers_and_errors_name_the_line() {
         let read = parse_points("y_m,z_m\n1, 2\n# floor\n-1,2\n").unwrap();
         assert_eq!(read, (vec![[1.0, 2.0], [-1.0, 2.0]], vec![2, 4]));
         assert_eq!(parse_points(&"1,2\n".repeat(MOST_POINTS)).unwrap().0.len(), MOST_POINTS);

@@ -31,15 +31,15 @@ pub struct VehicleConfig {
     pub target_m: f64,
     /// Length of a section along the tunnel, m.
     pub section_m: f64,
-    /// Water, gravity, levels.
+    /// Water, gravity and levels.
     pub site: Site,
-    /// Depth sensor whose temperature gives the speed of sound, in place of the site's.
+    /// Depth sensor whose temperature determines the speed of sound, instead of the site's value.
     pub sound_speed_from: Option<String>,
     /// The tunnel.
     pub tunnel: TunnelConfig,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
-    /// Speed for which the heads' phases are planned, m/s; zero ignores their positions along the hull.
+    /// Speed for which the heads' phases are planned, m/s; zero ignores the heads' positions along the hull.
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
@@ -55,13 +55,13 @@ pub struct VehicleConfig {
     pub alerts: AlertTiming,
     /// Limits of cable and time.
     pub limits: LimitsConfig,
-    /// The sensors, in the order of the file, which is the order of their sources.
+    /// The sensors, in the order of the file, which is also the order of their sources.
     pub sensors: Vec<Box<dyn Device>>,
-    /// The common part of each sensor's table, in the same order.
+    /// The common part of each sensor's table, in the same order as `sensors`.
     pub sensor_configs: Vec<SensorConfig>,
     /// Step and noise of the cable counter; `None` without one.
     pub counter: Option<CounterSpec>,
-    /// Files that this one refers to, with their text, so that a log can be replayed without them.
+    /// Files that the vehicle file refers to, with their text, so that a log can be replayed without them.
     pub attachments: Vec<(String, String)>,
 }
 
@@ -71,7 +71,7 @@ pub type WaterConfig = Site;
 /// Allowed targets, m.
 pub(super) const TARGET_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 
-/// Bounds on startup allocation: some hundred megabytes each for sections and wall cells.
+/// Limits of the startup allocation: some hundred megabytes each for sections and wall cells.
 const MAX_SECTIONS: f64 = 400_000.0;
 const MAX_CELLS: f64 = 2e8;
 
@@ -103,7 +103,9 @@ impl VehicleConfig {
         Ok(Self { attachments: attachments.into_inner(), ..vehicle })
     }
 
-    /// Reads everything except the attachments. Checks that depend on a wrong part are skipped.
+    /// Reads everything except the attachments.
+    ///
+    /// Checks that depend on a wrong part are skipped.
     fn from_root(
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
@@ -211,7 +213,7 @@ impl VehicleConfig {
         self.navigation.begin(&self.tunnel.profile, self.site)
     }
 
-    /// Scan programs of the heads, in the order of the file; empty without heads.
+    /// Scan programs of the heads, in the order of the file; empty if there are no heads.
     ///
     /// Errors: no program fits the heads.
     pub fn programs(&self) -> Result<Vec<HeadProgram>, SamplingError> {
@@ -228,14 +230,16 @@ impl VehicleConfig {
     }
 }
 
-/// Reads the tunnel, if present and valid, and the yaw of its axis, radians.
+/// Reads the tunnel and the yaw of its axis, radians.
+///
+/// The tunnel is `None` if it is missing or invalid.
 fn parse_tunnel(root: &Section<'_>, load: Loader<'_>) -> Result<(Option<TunnelConfig>, f64), ConfigError> {
     let Some(section) = root.section("tunnel")? else { return Ok((None, 0.0)) };
     let axis_yaw_rad = section.number("axis_yaw_deg", DEGREES)?.unwrap_or(0.0).to_radians();
     Ok((root.part(|| TunnelConfig::from_section(&section, load))?, axis_yaw_rad))
 }
 
-/// Checks that the loop can allocate what it needs for sections and samples.
+/// Checks that the loop can allocate its memory for sections and samples.
 fn check_fineness(
     root: &Section<'_>,
     tunnel: &TunnelConfig,
@@ -296,7 +300,9 @@ fn check_sound(root: &Section<'_>, told_by: Option<&str>, sensors: &Sensors) -> 
     Err(root.invalid("water", &problem))
 }
 
-/// Checks the number of heads, and that none is inside a hull box, which could not occlude it.
+/// Checks the number of heads, and that no head is inside a hull box.
+///
+/// A hull box around a head could not occlude this head.
 fn check_heads(
     root: &Section<'_>,
     sensors: &[Box<dyn Device>],
@@ -317,7 +323,7 @@ fn check_heads(
     Ok(())
 }
 
-/// Reads layout and planned speed, m/s; `sensors` is `None` unless all of them are valid.
+/// Reads the layout and the planned speed, m/s; `sensors` is `None` unless all sensors are valid.
 fn parse_heads(
     section: &Section<'_>,
     sensors: Option<&[Box<dyn Device>]>,

@@ -1,5 +1,6 @@
-//! Serialises a set of heads in evidence: as a list of numbers in text formats such as JSON, as bits in
-//! snapshots.
+//! Serialises a set of heads in evidence.
+//!
+//! The set becomes a list of numbers in text formats such as JSON, and bits in snapshots.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -1,4 +1,4 @@
-//! A failed section, its surroundings, and the counts over them.
+//! A failed section, its surroundings, and counts over both.
 
 use crate::cause::Cause;
 use crate::causes::Causes;
@@ -9,39 +9,39 @@ use crate::passage::{Drive, Passage};
 use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 
-/// Removing a factor helps if distances shrink at least to this share.
+/// Largest ratio of distances, without and with a factor, at which the removal of the factor helps.
 pub(super) const HELPS: f64 = 0.93;
-/// Largest hole size considered when missing samples around it are counted, in targets.
+/// Largest hole size for which the surroundings are searched for missing samples, in targets.
 pub(super) const WIDEST: f64 = 8.0;
 
 /// A failed section and its surroundings.
 #[derive(Debug, Clone, Copy)]
 pub struct Case<'a> {
-    /// Its hole.
+    /// Hole of the section.
     pub hole: &'a Hole,
-    /// Chainages of its two ends, m.
+    /// Chainages of the section's two ends, m.
     pub bounds_m: (f64, f64),
     /// Number of the first visit whose samples count.
     pub first_visit: u32,
-    /// Stretch that every live head had swept by then.
+    /// Stretch that every live head had swept at the time of the request.
     pub swept_by_all: Option<Reach>,
-    /// Stretch where samples may still land: the wall there is unknown.
+    /// Stretch where samples may still land; the wall in this stretch is unknown.
     pub to_come: Option<Reach>,
-    /// No head was alive then.
+    /// Whether no head was alive at the time of the request.
     pub none_alive: bool,
-    /// No head pinged in the section, and some passed through it silent.
+    /// Whether no head pinged in the section, and at least one head passed through it in silence.
     pub is_dark: bool,
-    /// Its samples come from stretches of navigation with no certain relation to each other.
+    /// Whether the section's samples come from unrelated stretches of navigation.
     pub is_torn: bool,
     /// Target T, m.
     pub target_m: f64,
-    /// Causes named for the neighbouring sections. They are preferred among equally small sets.
+    /// Causes named for the neighbouring sections, which are preferred among equally small sets.
     pub beside: [Causes; 2],
     /// Latest missing samples.
     pub lacks: &'a MissingSamples,
 }
 
-/// Counts over the sections, and the driving figures at the largest T as driven.
+/// Counts over the sections, and the driving figures at the moment with the largest T as driven.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Seen {
     pub(super) pings: u32,
@@ -91,13 +91,16 @@ pub(super) fn is_passed(case: &Case<'_>) -> bool {
 
 /// Whether the pings of silent heads can't be reconstructed.
 ///
-/// True in sectors, for heads never heard, or if all heads were silent for longer than the list of missing
-/// samples goes back.
+/// True in sectors, for heads that never pinged, or if all heads were silent for longer than the list of missing
+/// samples covers.
 pub(super) fn is_dark(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_in_sectors || is_unheard(case, seen)
 }
 
-/// Whether silent heads were never heard, or no head was.
+/// Whether the places where silent heads would have pinged are unknown.
+///
+/// True if some silent heads never pinged, or if no head pinged in the section and no missing samples of silent heads
+/// are listed.
 pub(super) fn is_unheard(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_unheard || case.is_dark && !is_remembered(case)
 }
@@ -108,8 +111,9 @@ pub(super) fn is_remembered(case: &Case<'_>) -> bool {
     lacking.any(|lack| lack.why.has(Cause::HeadSilent))
 }
 
-/// Whether a missing sample lies in a hole, up to the size of the target: the hole may still shrink from
-/// ahead.
+/// Whether a missing sample lies in a hole, up to the size of the target.
+///
+/// Only the size of the target counts, because the hole may still shrink from ahead.
 pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
     let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
     math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0

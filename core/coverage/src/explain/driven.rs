@@ -8,9 +8,9 @@ use headrace_geometry::math;
 use headrace_sampling::losses::MOST_PASSES;
 
 impl Drive {
-    /// Largest speed that fits if this many passes are needed in place of one, m/s.
+    /// Largest speed that fits if this many passes replace a single pass, m/s.
     ///
-    /// Zero if so much is lost that no speed is worth driving.
+    /// Zero if so many returns are lost that no useful speed remains.
     pub(crate) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
         if passes_needed >= MOST_PASSES {
             return 0.0;
@@ -23,10 +23,10 @@ impl Drive {
         }
     }
 
-    /// These figures with some factors removed.
+    /// Returns these figures with some factors removed.
     ///
-    /// `margin_m` is the target less a margin, m; it gives the speed that would have been right. With
-    /// `all_turn`, no head is silent or out of step any more.
+    /// `margin_m` is the target less a margin, m, and determines the speed that would have been right. With
+    /// `all_turn`, no head is silent or out of step.
     pub(super) fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
         let mut slower = 1.0;

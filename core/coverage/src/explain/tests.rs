@@ -28,14 +28,14 @@ fn sound() -> Drive {
     }
 }
 
-/// A wall with a lattice of samples except in some places, and what is known about it.
+/// A wall with a lattice of samples except in some places, and the known facts about this wall.
 struct Wall {
     along_m: f64,
     around_m: f64,
     drive: Drive,
-    /// A place without samples: its ends along and around, m.
+    /// A place without samples: its ends along and around the tunnel, m.
     bare: Option<[[f64; 2]; 2]>,
-    /// Why its samples are missing; empty if unknown.
+    /// Causes of the missing samples; empty if unknown.
     why: Causes,
     end_m: f64,
     beside: [Causes; 2],
@@ -61,7 +61,7 @@ impl Default for Wall {
     }
 }
 
-/// A place in the section that a turn of pings has missed.
+/// A place in the section that one turn of pings has missed.
 const BARE: Option<[[f64; 2]; 2]> = Some([[9.7, 10.5], [3.0, 4.5]]);
 
 fn named(wall: &Wall) -> Vec<Cause> {
@@ -69,7 +69,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
         StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
     let (mut store, mut lacks) = (SampleStore::new(layout), MissingSamples::default());
     let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
-    // The centre between two passes lies in the centre of the section.
+    // The centre between two passes is the centre of the section.
     let rows = count(4.0, wall.along_m);
     let x_m = |i: i64| 10.125 + (i as f64 + 0.5) * wall.along_m;
     for i in (-rows..=rows).filter(|i| x_m(*i) < wall.end_m) {
@@ -150,12 +150,12 @@ fn each_single_cause_is_named() {
 }
 
 #[test]
-fn two_needed_causes_are_both_named_and_of_two_sufficient_the_changeable_one() {
+fn both_causes_are_named_only_if_both_are_needed() {
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let why = Causes::of(Cause::MissingReturns);
     assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
-    // Scattered losses have only made it worse.
+    // Scattered losses enlarge the hole, but they are not needed for the fail.
     let here = Some([[10.4, 10.5], [3.0, 3.1]]);
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
@@ -167,7 +167,9 @@ fn two_needed_causes_are_both_named_and_of_two_sufficient_the_changeable_one() {
     );
 }
 
-/// Heads slightly out of phase make the hole worse, but without the other two factors it would pass.
+/// Heads slightly out of phase enlarge the hole.
+///
+/// Without the other two factors, the section would pass despite the phase.
 #[test]
 fn two_sufficient_causes_of_three_present_are_named() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
@@ -177,10 +179,11 @@ fn two_sufficient_causes_of_three_present_are_named() {
     assert_eq!(named(&wall), [Cause::TooFast, Cause::MissingReturns]);
 }
 
-/// A setting with a longer turn leaves passes farther apart. If they have no room for that, the setting alone
-/// isn't enough.
+/// A setting with a longer turn leaves passes farther apart.
+///
+/// If this distance exceeds the target, the setting alone does not explain the fail.
 #[test]
-fn longer_range_and_finer_step_widen_the_pass_gap() {
+fn longer_turn_must_leave_the_gap_between_passes_within_the_target() {
     let other = |turn: f64| OtherSettings { finer_step: 0.5, finer_turn: turn, longer_turn: turn };
     let drive = |turn: f64| Drive { other: other(turn), ..sound() };
     let far = |turn: f64| Wall {
@@ -199,18 +202,18 @@ fn longer_range_and_finer_step_widen_the_pass_gap() {
     assert_eq!(named(&coarse(3.0)), [Cause::Unknown]);
 }
 
-/// A head that stays out of step leaves the passes equally far apart, however straight the vehicle goes.
+/// A stalled head leaves the passes equally far apart, however straight the vehicle moves.
 #[test]
-fn stalled_head_gap_remains_when_swing_is_removed() {
+fn stalled_head_leaves_wide_pass_gaps_without_swing() {
     let why = Causes::of(Cause::HeadStalled);
     let drive = Drive { swing_m: 0.4, gap_s: 4.0, gap_at_plan_s: 4.0, ..sound() };
     let wall = Wall { along_m: 0.78, bare: Some([[9.0, 11.3], [3.0, 6.0]]), why, drive, ..Wall::default() };
     assert_eq!(named(&wall), [Cause::OffAxis, Cause::HeadStalled]);
 }
 
-/// Nothing else is known about heads that were never heard: the speed is no cause then.
+/// If heads never pinged, nothing else is known about them, so speed is not named as a cause.
 #[test]
-fn silence_is_named_if_no_head_was_heard() {
+fn silence_is_named_if_no_head_pinged() {
     let fast = || Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { is_dark: true, ..fast() }), [Cause::HeadSilent]);
     assert_eq!(named(&fast()), [Cause::TooFast]);
@@ -230,28 +233,27 @@ fn cause_of_a_neighbour_is_preferred_if_sufficient() {
 }
 
 #[test]
-fn causes_have_the_same_word_everywhere_in_a_report() {
+fn cause_has_the_same_word_in_text_and_json() {
     for cause in Cause::ALL {
         assert_eq!(serde_json::to_value(cause).unwrap(), cause.as_str());
     }
 }
 
-/// If more passes are needed in place of one, these passes and the pings between them share the distance that
-/// fits.
+/// The distance that fits is shared by all needed passes and the time of a ping.
 #[test]
-fn speed_with_losses_fits_all_passes_needed() {
+fn speed_with_losses_leaves_time_for_all_needed_passes() {
     let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };
     assert!((drive.with_losses_mps(1.0) - 0.19).abs() < 1e-12);
-    // 0.4 m over 1.5 passes of 2 s and a ping.
+    // The speed is 0.4 m divided by the time of 1.5 passes of 2 s and a ping.
     assert!((drive.with_losses_mps(1.5) - 0.4 / 3.02).abs() < 1e-12);
     assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "not faster than without losses");
 }
 
-/// Times between passes with factors removed lie between the measured ones.
+/// Expected times between passes for each set of removed factors.
 ///
-/// These are as scheduled, without stalls, and at the planned speed.
+/// The measured times are those as driven, as scheduled, without stalls, and at the planned speed.
 #[test]
-fn removing_a_cause_keeps_the_passes_of_the_remaining_heads() {
+fn time_between_passes_depends_on_the_removed_causes() {
     let drive = Drive {
         healthy_gap_s: 4.0,
         planned_gap_s: 3.0,
@@ -285,8 +287,8 @@ fn removing_a_cause_keeps_the_passes_of_the_remaining_heads() {
         let then = without(causes, all_turn);
         assert!(near(then.healthy_gap_s, gap_s), "{causes:?} {all_turn}: {}", then.healthy_gap_s);
     }
-    // A longer range doubles the time between passes. A finer mode takes half as long again. Both scale every
-    // time that turns with the heads.
+    // A longer range doubles the time between passes. A finer mode takes half as long again. Both factors scale all
+    // times that depend on the turn period.
     for (causes, slower, finer) in [
         (&[Cause::OutOfRange][..], 2.0, 1.0),
         (&[Cause::AngularStep], 1.5, 0.5),
@@ -301,12 +303,12 @@ fn removing_a_cause_keeps_the_passes_of_the_remaining_heads() {
     assert!(near(straight.swing_m, 0.0) && near(straight.t_y_m, 0.2) && near(straight.healthy_gap_s, 4.0));
 }
 
-/// With a target of 0.5 m and steps of 0.3 m along the wall, 0.4 m are left along the tunnel.
+/// With a target of 0.5 m and steps of 0.3 m along the wall, 0.4 m remain along the tunnel.
 #[test]
-fn removing_too_fast_gives_the_largest_fitting_speed() {
+fn removed_speed_cause_gives_the_largest_speed_that_fits() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
     let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
-    // A pass takes 2 s, and a ping follows it.
+    // The speed is 0.4 m divided by the time of a pass, 2 s, and of a ping.
     assert!((slowed_mps(drive) - 0.4 / 2.02).abs() < 1e-9, "{}", slowed_mps(drive));
     assert!(
         (slowed_mps(Drive { fits_mps: 0.1, ..drive }) - 0.1).abs() < 1e-9,
@@ -317,15 +319,16 @@ fn removing_too_fast_gives_the_largest_fitting_speed() {
         (slowed_mps(Drive { speed_mps: 0.15, ..drive }) - 0.15).abs() < 1e-9,
         "the vehicle wasn't too fast"
     );
-    // If steps leave nothing, three tenths of the target remain.
+    // If steps exceed the target, three tenths of the target remain along the tunnel.
     let coarse = Drive { t_y_m: 0.6, middle_t_y_m: 0.6, ..drive };
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
 }
 
-/// At 0.1 m/s heads pass as far apart after 4 s as after 2 s at the planned 0.2 m/s. Driving as planned mends
-/// only distances that are larger by more than the helping factor.
+/// At 0.1 m/s, heads pass as far apart after 4 s as after 2 s at the planned 0.2 m/s.
+///
+/// The planned speed helps only if distances shrink by more than the factor `HELPS`.
 #[test]
-fn removing_phase_gives_the_planned_speed_if_that_helps() {
+fn removed_phase_cause_gives_the_planned_speed_if_this_speed_helps() {
     let then = |planned_gap_s: f64| {
         let drive = Drive {
             speed_mps: 0.1,

@@ -11,36 +11,36 @@ use crate::store::SampleStore;
 use headrace_geometry::math;
 use headrace_sampling::spacing;
 
-/// Share of the target that the hole may use once the speed is corrected: a plan keeps a margin.
+/// Share of the target that the hole may use if the speed is corrected, because a plan keeps a margin.
 const MARGIN: f64 = 0.85;
-/// Limits of the factor that scales the wall. A finer step or a longer range takes longer to turn, which
-/// stretches it.
+/// Limits of the factor that scales the wall.
+///
+/// A finer step or a longer range takes longer per turn, which stretches the wall.
 const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
-/// Multiple of the target above which the remaining hole has some other cause.
+/// Multiple of the target above which the remaining hole has a cause that is not present.
 const AT_MOST: f64 = 1.3;
-/// Most halvings in the search for the hole with all missing samples put back.
+/// Maximum number of halvings in the search for the hole with all missing samples put back.
 const SEARCHED: u32 = 5;
-/// Share of samples near a hole missing for persistent reasons above which these alone make a hole.
+/// Share of missing samples with remaining causes above which these causes alone make a hole.
 const STAYS: f64 = 0.15;
-/// Size of the largest set tried.
+/// Maximum number of causes in a set.
 const MOST_NAMED: u32 = 3;
-/// Most sets tried.
+/// Maximum number of sets tested.
 const MOST_TRIED: u32 = 120;
 
-/// Tries holes with some of the factors removed.
+/// Computes holes with some of the factors removed.
 pub(super) struct Trial<'a> {
     case: &'a Case<'a>,
     drive: &'a Drive,
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// Factors that were present, and those of them with missing samples.
+    /// Factors that were present, and the subset of them that has missing samples.
     present: Causes,
     lacking: Causes,
     left: u32,
-    /// Bounds of the hole's diameter with all missing samples put back, m, and the halvings left to narrow
-    /// them.
+    /// Bounds of the hole's diameter with all missing samples put back, m, and the number of halvings left.
     full_m: [f64; 2],
     halvings: u32,
 }
@@ -65,7 +65,7 @@ impl<'a> Trial<'a> {
         let lacking: Causes = lacking.into_iter().filter(|cause| present.has(*cause)).collect();
         let most_m = case.hole.diameter_m.min(WIDEST * case.target_m);
         let [from_m, to_m] = [-0.5, 0.5].map(|side| case.hole.x_m + side * case.hole.diameter_m);
-        // Samples put back outside the hole don't shrink it.
+        // Samples outside the hole don't shrink the hole if they are put back.
         let fills = |lack: &MissingSample| {
             lack.why.is_within(lacking) && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), lack)
         };
@@ -78,8 +78,8 @@ impl<'a> Trial<'a> {
     /// Smallest set of present factors without which the section would have met the target.
     pub(super) fn smallest(&mut self) -> Causes {
         let silent = Causes::of(Cause::HeadSilent);
-        // If no head pinged, their silence comes first. The vehicle's driving is no cause then, but reasons
-        // for which heads would not have heard the wall may be.
+        // If no head pinged, silence comes first. Driving is then no cause, but the heads might not have heard the
+        // wall for other reasons.
         let surely = if self.case.is_dark { silent } else { Causes::default() };
         if self.case.is_dark {
             let is_driven = |cause: &Cause| {
@@ -108,26 +108,28 @@ impl<'a> Trial<'a> {
         present
     }
 
-    /// The set without `occluded`, if occlusion concerns wall out of range and the rest nearly suffices.
+    /// Returns the set without `occluded` if the rest nearly suffices and wall is out of range.
     ///
-    /// Heads that hide wall from each other also do so with a longer range, and other heads see that wall.
+    /// Heads that hide wall from each other also do so with a longer range, and other heads see this wall.
     fn less_occluded(&mut self, set: Causes) -> Causes {
         let rest = set.without(Cause::Occluded);
         let is_far = set.has(Cause::Occluded) && set.has(Cause::OutOfRange);
         if is_far && self.passes_without(rest, AT_MOST) { rest } else { set }
     }
 
-    /// The single factor without which the section would have met the target; a certain one if there is one.
+    /// Returns the single factor without which the section would have met the target.
+    ///
+    /// If `surely` contains a certain factor, only that factor is tested.
     fn alone(&mut self, surely: Causes) -> Option<Causes> {
         let [not_passed, silent, phase, lost] =
             [Cause::NotPassed, Cause::HeadSilent, Cause::Phase, Cause::PositionLost].map(Causes::of);
         let is_short = self.is_short();
         let first = [
-            // Nothing else is known about wall that wasn't passed.
+            // If the wall was not passed, no other factor is known.
             (true, not_passed),
-            // The same holds for heads that were never heard.
+            // If heads never pinged, no other factor is known.
             (is_unheard(self.case, self.seen), silent),
-            // Speed is changed most easily, so it is named if the planned speed would have been enough.
+            // Speed is the easiest change, so it is named if the planned speed would have been enough.
             (!is_short && self.drive.is_slow_out_of_phase(1.0 / HELPS), phase),
         ];
         // Factors that may only seem to explain the hole come last.
@@ -142,20 +144,22 @@ impl<'a> Trial<'a> {
         in_turn.filter(|set| set.is_within(present)).find(|set| self.passes_without(*set, 1.0))
     }
 
-    /// Whether a head is silent or has stalled: the remaining heads are out of phase without it.
+    /// Whether a head is silent or has stalled.
+    ///
+    /// Without this head, the remaining heads are out of phase.
     fn is_short(&self) -> bool {
         self.present.has(Cause::HeadSilent) || self.present.has(Cause::HeadStalled)
     }
 
-    /// Whether the only evidence against the position is the error of one pass against the next.
+    /// Whether the only evidence against the position is the error between passes.
     ///
-    /// A fail already allows for that error, and the error would explain any hole. Every other explanation
-    /// therefore comes first.
+    /// A fail already allows for this error, and the error would explain any hole. Every other explanation therefore
+    /// comes first.
     fn is_only_adrift(&self) -> bool {
         self.seen.adrift && !self.seen.unseen && !self.case.is_torn
     }
 
-    /// Factors that every sufficient set contains: all others together don't suffice.
+    /// Returns the factors in every sufficient set: without one of them, all others don't suffice.
     fn needed(&mut self, present: Causes) -> Causes {
         let mut is_needed = |cause: &Cause| !self.passes_without(present.without(*cause), 1.0);
         present.iter().filter(|cause| is_needed(cause)).collect()
@@ -180,29 +184,30 @@ impl<'a> Trial<'a> {
         !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise)
     }
 
-    /// Lays out the wall with some factors removed.
+    /// Lays out the wall with some factors removed, for the search for holes.
     fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &WallChanges) {
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
         let put_back = lacks
-            // Includes samples that are mirrored later.
+            // The range includes samples that are mirrored later.
             .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
             .filter(|lack| lack.why.is_within(removed))
             .map(|lack| [lack.x_m, lack.arc_m]);
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
     }
 
-    /// Whether wall counts as covered with some factors removed, because the places of its missing samples
-    /// are unknown.
+    /// Whether all wall counts as covered if some factors are removed.
+    ///
+    /// True if the places of the missing samples of these factors are unknown.
     fn covers(&self, removed: Causes) -> bool {
         let is_lost = self.case.is_torn || self.seen.unseen || self.seen.adrift;
         removed.has(Cause::PositionLost) && is_lost
             || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
     }
 
-    /// Distance between neighbours that remains with some factors removed, m, by movement alone.
+    /// Distance between neighbouring samples with some factors removed, m, from the movement alone.
     ///
-    /// Infinite if much is missing for persistent reasons.
+    /// Infinite if many samples are missing for the remaining factors.
     fn stays_m(&self, removed: Causes) -> f64 {
         let Case { bounds_m, lacks, .. } = *self.case;
         let (mut all, mut stay) = (0_u32, 0_u32);
@@ -217,9 +222,9 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(then.along_m(), 0.0, then.t_y_m)
     }
 
-    /// Whether random losses that persist leave enough samples once the beams no longer swing.
+    /// Whether enough samples remain despite random losses, once the beams no longer swing.
     ///
-    /// The wall can't be compressed for such losses.
+    /// The wall is not compressed for such losses.
     fn is_sampled_without(&self, removed: Causes, target_m: f64) -> bool {
         let is_lossy = self.present.less(removed).has(Cause::MissingReturns);
         if !is_lossy || !removed.has(Cause::OffAxis) {
@@ -229,10 +234,10 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(self.drive.passes_needed * then.along_m(), 0.0, then.t_y_m) <= target_m
     }
 
-    /// Movement of vehicle and heads as driven, and with some factors removed.
+    /// Returns the movement of vehicle and heads as driven, and with some factors removed.
     ///
-    /// `healthy_gap_s` is the time between passes of the present heads: if silent or stalled heads stay so,
-    /// it leaves them out.
+    /// `healthy_gap_s` is the time between passes of the heads that are present. It excludes silent or stalled heads
+    /// if these factors remain.
     fn drives(&self, removed: Causes) -> [Drive; 2] {
         let stalls = Causes::of(Cause::HeadSilent).with(Cause::HeadStalled);
         let staying = self.present.less(removed);
@@ -246,7 +251,7 @@ impl<'a> Trial<'a> {
 
     /// Diameter of the hole that driving has to explain, with all missing samples put back, m.
     ///
-    /// It is only as exact as the comparison with the two bounds needs.
+    /// The diameter is only as exact as the comparison with the two bounds requires.
     fn full_m(&mut self, [least_m, most_m]: [f64; 2]) -> f64 {
         let matters = |[smaller_m, larger_m]: [f64; 2]| smaller_m < most_m && larger_m > least_m;
         if least_m < most_m && self.halvings > 0 && matters(self.full_m) {
@@ -267,12 +272,14 @@ impl<'a> Trial<'a> {
         self.full_m[1]
     }
 
-    /// Stretch where samples may still land. Beyond the end of the passed stretch the wall is not mirrored.
+    /// Stretch where samples may still land, for which the wall is mirrored.
+    ///
+    /// `None` if the hole extends beyond the passed stretch, where the wall is not mirrored.
     fn to_come(&self) -> Option<Reach> {
         self.case.to_come.filter(|_| is_passed(self.case))
     }
 
-    /// How the wall would have been sampled with some factors removed.
+    /// Returns the changes of the wall if some factors are removed.
     fn otherwise(&mut self, removed: Causes) -> WallChanges {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;
@@ -293,7 +300,7 @@ impl<'a> Trial<'a> {
         let [now, then] = self.drives(removed);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
-        // Figures of one moment don't explain more than the hole.
+        // The driving figures of a single moment must not explain more than the hole.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         WallChanges {

@@ -1,28 +1,30 @@
 //! A tile divided into the Voronoi cells of its samples.
 //!
-//! Each share is a convex polygon, on which the distance to its sample is largest at a corner.
+//! Each share is a convex polygon. The distance from the share's sample is largest at a corner.
 
-/// Maximum samples that a tile is divided among; with more it is halved instead.
+/// Maximum number of samples among which a tile is divided.
+///
+/// With more samples, the tile is halved instead.
 pub(super) const MAX_OWNERS: usize = 24;
-/// Maximum corners of a share. With more, the tile is halved, too.
+/// Maximum number of corners of a share; with more corners, the tile is halved instead.
 const MAX_CORNERS: usize = 12;
 
 /// A share of a tile.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Share {
-    /// Its sample relative to the tile's centre, m.
+    /// Sample of the share, relative to the tile's centre, m.
     pub owner: (f64, f64),
-    /// Corners relative to the owner, where differences of nearby points are exact, m.
+    /// Corners relative to the share's sample, where differences of nearby points are exact, m.
     corners: [(f64, f64); MAX_CORNERS],
     len: usize,
-    /// Squared distance of the farthest corner from the owner; zero when nothing is left.
+    /// Squared distance of the farthest corner from the sample; zero for an empty share.
     pub farthest2: f64,
     /// The farthest corner.
     pub farthest: (f64, f64),
 }
 
 impl Share {
-    /// The whole tile with these half edges as the share of one owner.
+    /// Returns the whole tile with these half edges as the share of one sample.
     fn whole(owner: (f64, f64), (half_x, half_arc): (f64, f64)) -> Self {
         let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
         let (low, high) = (-owner.1 - half_arc, -owner.1 + half_arc);
@@ -34,7 +36,7 @@ impl Share {
         share
     }
 
-    /// Adds a corner; false if there are too many.
+    /// Adds a corner; returns false if there are too many corners.
     fn push(&mut self, corner: (f64, f64)) -> bool {
         let Some(place) = self.corners.get_mut(self.len) else { return false };
         *place = corner;
@@ -46,11 +48,13 @@ impl Share {
         true
     }
 
-    /// Clips to the half-plane nearer to the owner than to a rival; false if there are too many corners.
+    /// Clips the share to the points nearer to its sample than to a rival.
+    ///
+    /// Returns false if there are too many corners.
     fn clip(&mut self, rival: (f64, f64)) -> bool {
         let (nx, ny) = (rival.0 - self.owner.0, rival.1 - self.owner.1);
         let half = 0.5 * (nx * nx + ny * ny);
-        // A rival more than twice as far as the farthest corner cuts nothing: half > 2 farthest^2.
+        // A rival more than twice as far away as the farthest corner cuts off nothing: half > 2 farthest^2.
         if half > 2.0 * self.farthest2 {
             return true;
         }
@@ -83,7 +87,7 @@ impl Share {
 
 /// A tile divided among the samples found so far.
 ///
-/// The farthest corner of any share bounds the whole tile; more samples only lower it.
+/// The farthest corner of any share bounds the distance in the whole tile. More samples only reduce the bound.
 #[derive(Debug)]
 pub(super) struct Division {
     half_edges: (f64, f64),
@@ -97,20 +101,21 @@ impl Default for Division {
 }
 
 impl Division {
-    /// Starts with a tile and its first owner.
+    /// Starts the division with a tile and its first sample.
     pub(super) fn begin(&mut self, half_edges: (f64, f64), owner: (f64, f64)) {
         self.half_edges = half_edges;
         self.shares.clear();
         self.shares.push(Share::whole(owner, half_edges));
     }
 
-    /// The share with the farthest corner.
+    /// Returns the share with the farthest corner.
     pub(super) fn worst(&self) -> Option<&Share> {
         self.shares.iter().max_by(|a, b| a.farthest2.total_cmp(&b.farthest2))
     }
 
-    /// Adds the share of a sample. False if the sample has one already or there is no room: the tile is too
-    /// large.
+    /// Adds the share of a sample.
+    ///
+    /// Returns false if the sample already has a share or there is no room for another: the tile is too large.
     pub(super) fn add(&mut self, owner: (f64, f64)) -> bool {
         let same = |share: &Share| (share.owner.0 - owner.0).abs() + (share.owner.1 - owner.1).abs() <= 0.0;
         if self.shares.len() == MAX_OWNERS || self.shares.iter().any(same) {

@@ -1,22 +1,26 @@
-//! Hypothetical holes: with missing samples put back, the wall compressed, or stretches covered.
+//! Hypothetical holes on a changed wall.
+//!
+//! Missing samples are put back, the wall is compressed, or stretches count as covered.
 
 use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
 
-/// Search resolution as a share of the radius: a circle larger by less than this may be missed.
+/// Search resolution as a share of the radius: a circle larger by less than this share may be missed.
 const FINE: f64 = 0.01;
 
 /// Hypothetical changes to the wall.
 #[derive(Debug, Clone, Copy)]
 pub struct WallChanges {
-    /// Factor on distances along the tunnel, above 0, at most 1.
+    /// Factor on distances along the tunnel, above 0 and at most 1.
     pub along: f64,
     /// Factor on distances around the perimeter.
     pub around: f64,
     /// Stretches whose wall counts as covered.
     pub covered: [Option<Reach>; 4],
-    /// Stretch where samples may still land. Its wall is taken as the mirror image of the wall on this side.
+    /// Stretch where samples may still land.
+    ///
+    /// The wall in this stretch is taken as the mirror image of the wall outside it.
     pub to_come: Option<Reach>,
 }
 
@@ -24,21 +28,22 @@ impl WallChanges {
     /// No change.
     pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
 
-    /// Distance of a chainage from the nearest stretch counted as covered, m.
+    /// Distance of a chainage from the nearest covered stretch or the stretch to come, m.
     fn clear_m(&self, x_m: f64) -> f64 {
         let off_m = |reach: &Reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0);
         let covered_m = self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along;
         self.to_come.as_ref().map(off_m).map_or(covered_m, |to_come_m| covered_m.min(to_come_m))
     }
 
-    /// End of the stretch where samples may still land, at which the wall is mirrored, m.
+    /// End of the stretch to come, at which the wall is mirrored, as chainage, m.
     fn mirror_m(&self) -> Option<f64> {
         self.to_come.iter().flat_map(|reach| [reach.from_m, reach.to_m]).find(|x_m| x_m.is_finite())
     }
 }
 
-/// A stretch and its mirror image, in ascending order. They are one stretch if they meet; a gap between them
-/// is in neither.
+/// Returns a stretch and its mirror image, in ascending order.
+///
+/// If they meet, they are joined to one stretch. A gap between them belongs to neither.
 fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
     let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
     if image_m[0] > to_m {
@@ -51,11 +56,10 @@ fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 
 }
 
 impl HoleFinder {
-    /// Lays out the wall with the changes `otherwise` and the additional samples `more` (chainage and arc
-    /// length, m).
+    /// Lays out the wall with the changes `otherwise` and the additional samples `more`.
     ///
-    /// It serves circles of up to `radius_m` centred between two chainages. Samples count from visit
-    /// `first_visit` on.
+    /// `more` contains chainage and arc length, m. The layout suffices for circles of up to `radius_m` centred
+    /// between two chainages. Samples of visits from `first_visit` on count.
     ///
     /// Allocates: never.
     pub fn lay_otherwise(
@@ -94,10 +98,10 @@ impl HoleFinder {
         window.sort();
     }
 
-    /// Whether a circle of `radius_m` centred between two chainages holds no sample on the wall laid out by
-    /// [`lay_otherwise`](Self::lay_otherwise).
+    /// Whether a circle of `radius_m` centred between two chainages holds no sample.
     ///
-    /// The wall must have been laid out for circles at least this large.
+    /// The search uses the wall laid out by [`lay_otherwise`](Self::lay_otherwise), which must have allowed for
+    /// circles at least this large.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle_otherwise(
@@ -131,8 +135,9 @@ mod tests {
     use super::*;
     use crate::store::{StoreLayout, WallSample};
 
-    /// Samples every 0.5 m along and around a wall of 10 m perimeter, except those for which `is_in` is
-    /// false.
+    /// Whether there is an empty circle on a wall of 10 m perimeter.
+    ///
+    /// The wall has samples every 0.5 m along and around, except where `is_in` is false.
     fn has(
         is_in: impl Fn(u32, u32) -> bool,
         radius_m: f64,
@@ -163,7 +168,7 @@ mod tests {
     #[test]
     fn compressed_wall_has_smaller_holes() {
         let all = |_, _| true;
-        // Half the diagonal of a mesh of 0.5 by 0.5 m, and of 0.25 by 0.5 m.
+        // The radius is half the diagonal of a mesh of 0.5 by 0.5 m, or of 0.25 by 0.5 m.
         for (otherwise, radius_m) in [
             (WallChanges::NOTHING, 0.3535),
             (WallChanges { along: 0.5, ..WallChanges::NOTHING }, 0.2795),
@@ -174,9 +179,11 @@ mod tests {
         }
     }
 
-    /// A bare stretch of 2.5 m, compressed to 0.75 m, is bounded by the wall on both sides.
+    /// A stretch of 2.5 m without samples is compressed to 0.75 m.
+    ///
+    /// Samples on both sides of the compressed stretch then bound the hole.
     #[test]
-    fn distant_samples_count_on_a_compressed_wall() {
+    fn compressed_wall_includes_samples_beyond_the_uncompressed_radius() {
         let sides = |i: u32, _| i <= 8 || i >= 13;
         let otherwise = WallChanges { along: 0.3, ..WallChanges::NOTHING };
         assert!(has(sides, 0.44, &otherwise, &[]));
@@ -185,7 +192,7 @@ mod tests {
 
     #[test]
     fn wall_is_mirrored_into_the_stretch_to_come() {
-        // On a compressed wall, a circle at the end extends ahead, where nothing has landed yet.
+        // On a compressed wall, a circle at the end of the samples extends ahead, where nothing has landed yet.
         let ends = |i: u32, _| i <= 10;
         let otherwise = WallChanges { along: 0.3, ..WallChanges::NOTHING };
         let to_come = Some(Reach { from_m: 5.25, to_m: f64::INFINITY });
@@ -198,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn distant_mirror_adds_no_samples_between() {
+    fn stretch_and_its_mirror_image_exclude_the_gap_between_them() {
         let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
             assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
         };

@@ -29,15 +29,15 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
 
 /// D from all candidate maxima of f, without any code of the search.
 ///
-/// Candidates are the circumcentres of three samples (or their images), and the points on the two edges
-/// equidistant from two samples.
+/// Candidates are the circumcentres of three samples (or of their images), and points on the section's two ends that
+/// are equidistant from two samples.
 fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> f64 {
     let images: Vec<(f64, f64)> =
         samples.iter().flat_map(|s| [-perimeter_m, 0.0, perimeter_m].map(|turn| (s.0, s.1 + turn))).collect();
     let mut candidates = Vec::new();
     for (i, a) in images.iter().enumerate() {
         for (j, b) in images.iter().enumerate().skip(i + 1) {
-            // |c - a| = |c - b|: n . c = k.
+            // |c - a| = |c - b| is the line n . c = k.
             let n = (b.0 - a.0, b.1 - a.1);
             let k = (b.0 * b.0 + b.1 * b.1 - a.0 * a.0 - a.1 * a.1) / 2.0;
             if n.1.abs() > 1e-12 {
@@ -75,7 +75,7 @@ proptest! {
         prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
     }
 
-    /// The window's search against brute force.
+    /// The reference for the window's search is brute force.
     #[test]
     fn window_finds_the_nearest_sample(
         samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
@@ -98,8 +98,9 @@ proptest! {
         }
     }
 
-    /// D lies within the bounds of a tolerant search, which are no farther apart than the tolerance. A verdict from them
-    /// is the exact one, or undecided where T lies between them.
+    /// D lies within the bounds of a tolerant search, whose distance is at most the tolerance.
+    ///
+    /// A verdict from these bounds equals the exact one, or is undecided if T lies between them.
     #[test]
     fn bounds_of_a_tolerant_search_contain_the_hole(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -118,7 +119,7 @@ proptest! {
         }
     }
 
-    /// Bounds also hold with packed samples: they include the displacement.
+    /// The bounds also hold with packed samples, because they include the displacement by packing.
     #[test]
     fn bounds_after_packing_contain_the_hole(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -136,13 +137,13 @@ proptest! {
         prop_assert!(width_m > 0.0 && width_m < 1e-4, "{:?}", hole);
     }
 
-    /// Bounds also hold with a cell so full that samples were thinned.
+    /// The bounds also hold if a cell is so full that samples were thinned.
     #[test]
     fn bounds_after_thinning_contain_the_hole(
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
     ) {
         let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
-        // Elsewhere samples are closer together than the gap in the crowd.
+        // Elsewhere, samples are closer together than the gap in the crowded cell.
         let fence = (-6..=14).flat_map(|i| (0..180).map(move |k| (f64::from(i) * 0.05, f64::from(k) * 0.05)));
         samples.extend(fence.filter(|s| !(4.0..4.4).contains(&s.1)));
         let thinned = store(PERIMETER_M, &samples);
@@ -162,7 +163,7 @@ proptest! {
         );
     }
 
-    /// In a small pipe holes are wider than its perimeter.
+    /// In a small pipe, holes are wider than the perimeter.
     #[test]
     fn pipe_narrower_than_its_holes_agrees_with_brute_force(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
@@ -172,9 +173,9 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// On a lattice every local maximum is equidistant from four samples.
+    /// On a lattice, every local maximum is equidistant from four samples.
     #[test]
-    fn lattice_has_its_diagonal_as_hole(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
+    fn hole_of_a_lattice_is_as_wide_as_its_diagonal(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
         let darc = PERIMETER_M / f64::from(around);
         let mut samples = Vec::new();
         for i in -12..=12 {
@@ -188,9 +189,9 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// D does not depend on the order of the samples, the seam or the origin of the chainage.
+    /// D does not depend on the order of the samples, on the seam or on the origin of the chainage.
     #[test]
-    fn shifting_mirroring_and_reversing_keep_the_hole(
+    fn hole_is_independent_of_sample_order_seam_and_chainage_origin(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
         turn in 0.0f64..PERIMETER_M,
     ) {
@@ -214,7 +215,7 @@ fn no_sample_in_reach_is_an_unbounded_hole() {
 }
 
 #[test]
-fn one_sample_is_antipodal_to_its_hole() {
+fn hole_of_a_single_sample_is_on_the_opposite_wall() {
     let hole = largest(PERIMETER_M, &[(0.0, 1.0)], 0.0, 0.25);
     let expected = 2.0 * math::hypot(0.25, PERIMETER_M / 2.0);
     assert!((hole.diameter_m - expected).abs() < 1e-9, "{hole:?}");
@@ -222,7 +223,7 @@ fn one_sample_is_antipodal_to_its_hole() {
 }
 
 #[test]
-fn collinear_repeated_and_coincident_samples_give_the_right_hole() {
+fn hole_of_collinear_repeated_and_coincident_samples_is_right() {
     let line: Vec<_> = (0..90).map(|i| (0.1, f64::from(i) * 0.1)).collect();
     let expected = brute_force(PERIMETER_M, &line[..20], 0.0, 0.25);
     let hole = largest(PERIMETER_M, &line[..20], 0.0, 0.25);
@@ -236,17 +237,17 @@ fn collinear_repeated_and_coincident_samples_give_the_right_hole() {
 }
 
 #[test]
-fn nanometre_and_metre_spacings_in_one_set_give_the_right_hole() {
+fn hole_of_samples_with_nanometre_and_metre_spacings_is_right() {
     let mut samples: Vec<_> = (0..20).map(|i| (f64::from(i) * 1e-9, 3.0 + f64::from(i % 3) * 1e-9)).collect();
     samples.extend([(0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)]);
     let few = [(0.0, 3.0), (0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)];
     let hole = largest(PERIMETER_M, &samples, 0.0, 0.25);
     let expected = brute_force(PERIMETER_M, &few, 0.0, 0.25);
-    // Samples a nanometre apart count as one in the expected value.
+    // The expected value treats samples a nanometre apart as one sample.
     found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
-/// Far along the tunnel D is the same, within double precision there.
+/// Far along the tunnel, D is the same to within the precision of doubles at that chainage.
 #[test]
 fn hole_is_the_same_at_7_km_and_at_1000_km() {
     let samples: Vec<_> =
@@ -271,7 +272,9 @@ fn hole_is_the_same_at_7_km_and_at_1000_km() {
     }
 }
 
-/// Reference values: `ceran`, 0.197 m/s, heads at the circle's centre in phase shift, as positions only.
+/// The reference values are for `ceran` at 0.197 m/s, with heads in phase shift at the circle's centre.
+///
+/// The samples are positions only, without steps.
 #[test]
 fn ideal_helices_have_the_reference_holes() {
     let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();
@@ -308,7 +311,7 @@ fn ideal_helices_have_the_reference_holes() {
 }
 
 #[test]
-fn samples_of_earlier_visits_do_not_fill_later_holes() {
+fn samples_of_visits_before_the_first_counted_one_are_ignored() {
     let grid = |off_m: f64| {
         (0..60).flat_map(move |i| {
             (0..20).map(move |k| (f64::from(i) * 0.1 + off_m, f64::from(k) * PERIMETER_M / 20.0))
@@ -328,7 +331,7 @@ fn samples_of_earlier_visits_do_not_fill_later_holes() {
     assert!(!none.bounded);
 }
 
-/// A hole that has grown, moved along or around, or become unbounded is a different one.
+/// A hole that has grown, moved along or around the tunnel, or become unbounded is a different hole.
 #[test]
 fn holes_are_alike_within_a_centimetre_in_every_respect() {
     let hole = Hole { diameter_m: 0.6, least_m: 0.6, most_m: 0.6, x_m: 7.0, arc_m: 3.0, bounded: true };

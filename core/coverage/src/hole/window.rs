@@ -3,9 +3,9 @@
 use crate::store::SampleStore;
 use headrace_geometry::math;
 
-/// Capacity, samples.
+/// Maximum number of samples.
 const ROOM: usize = 1 << 20;
-/// Capacity, cells.
+/// Maximum number of cells.
 const CELLS: usize = 1 << 20;
 
 /// Sample position: chainage from the window's origin, and arc length, m.
@@ -15,16 +15,16 @@ struct Spot {
     arc_m: f64,
 }
 
-/// Nearest sample to a point.
+/// The sample nearest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Nearest {
-    /// Its chainage from the window's origin, m.
+    /// Chainage of the sample from the window's origin, m.
     pub x_m: f64,
-    /// Its arc length, in [0, perimeter), m.
+    /// Arc length of the sample, in [0, perimeter), m.
     pub arc_m: f64,
-    /// Whole turns to add to the arc length to get the nearest image.
+    /// Number of whole turns to add to the arc length for the image nearest to the point.
     pub turns: f64,
-    /// Squared distance on the unrolled wall, m2.
+    /// Squared distance from the point to the sample on the unrolled wall, m2.
     pub distance2: f64,
 }
 
@@ -34,15 +34,15 @@ pub(super) struct Window {
     perimeter_m: f64,
     /// Chainage of the origin, m.
     origin_m: f64,
-    /// Chainage of the first row from the origin, m.
+    /// Distance of the first row from the origin, m.
     from_m: f64,
     cell_m: f64,
     column_m: f64,
-    /// Reciprocals of perimeter, cell length and cell width, 1/m: the same for sorting and for lookup.
+    /// Reciprocals of perimeter, cell length and cell width, 1/m; sorting and lookup share them.
     per_m: [f64; 3],
     rows: usize,
     columns: usize,
-    /// Start index of each cell's samples, row by row, with one more at the end.
+    /// Start index of each cell's samples, row by row, with an additional entry at the end.
     begins: Vec<u32>,
     spots: Vec<Spot>,
     unsorted: Vec<(u32, Spot)>,
@@ -72,7 +72,7 @@ impl Default for Window {
 impl Window {
     /// Loads all samples between two chainages relative to `origin_m` into cells of about `cell_m`.
     ///
-    /// Samples count from visit `first_visit` on.
+    /// Samples of visits from `first_visit` on count.
     ///
     /// Allocates: never.
     pub(super) fn fill(
@@ -91,14 +91,18 @@ impl Window {
         self.sort();
     }
 
-    /// Begins a window between two chainages relative to `origin_m`. Samples are then pushed and sorted.
+    /// Begins a window between two chainages relative to `origin_m`.
+    ///
+    /// The caller then pushes samples and sorts the window.
     pub(super) fn begin(&mut self, perimeter_m: f64, origin_m: f64, between_m: (f64, f64), cell_m: f64) {
         self.lay_out(perimeter_m, origin_m, between_m, cell_m);
         self.unsorted.clear();
         self.overfull = false;
     }
 
-    /// Adds a sample unless it lies outside the window. Its chainage is relative to the window's origin.
+    /// Adds a sample unless it lies outside the window.
+    ///
+    /// The sample's chainage is relative to the window's origin.
     pub(super) fn push(&mut self, x_m: f64, arc_m: f64) {
         let [_, per_row, per_column] = self.per_m;
         let row = (x_m - self.from_m) * per_row;
@@ -118,7 +122,7 @@ impl Window {
 
     fn lay_out(&mut self, perimeter_m: f64, origin_m: f64, (from_m, to_m): (f64, f64), cell_m: f64) {
         let cells = (to_m - from_m) * perimeter_m;
-        // Coarser cells if they would exceed the capacity.
+        // Cells are enlarged if their number would exceed the capacity.
         let cell_m = cell_m.max(1.5 * math::sqrt(cells / CELLS as f64));
         (self.perimeter_m, self.origin_m, self.from_m, self.cell_m) = (perimeter_m, origin_m, from_m, cell_m);
         self.rows = whole((to_m - from_m) / cell_m) + 1;
@@ -129,8 +133,10 @@ impl Window {
         self.begins.resize(self.rows * self.columns + 2, 0);
     }
 
-    /// Counting sort by cell. Counts are stored at cell + 2; their running sum at cell + 1 is the start of the cell, and
-    /// advances to the start of the next as its samples are placed.
+    /// Sorts the samples by cell, with a counting sort.
+    ///
+    /// Counts are stored at cell + 2. Their running sum at cell + 1 is the start index of the cell. It advances to
+    /// the start of the next cell while the samples are placed.
     pub(super) fn sort(&mut self) {
         let mut sum = 0;
         for begin in &mut self.begins {
@@ -158,12 +164,12 @@ impl Window {
         self.perimeter_m
     }
 
-    /// Nearest sample to a point within `within_m`; of equally near ones the first found.
+    /// Returns the sample nearest to a point within `within_m`; among equally near samples, the first found.
     pub(super) fn nearest(&self, x_m: f64, arc_m: f64, within_m: f64) -> Option<Nearest> {
         self.near(x_m, arc_m, within_m, -1.0)
     }
 
-    /// Nearest sample to a point within `within_m`, or any sample within `enough_m`.
+    /// Returns the sample nearest to a point within `within_m`, or any sample within `enough_m`.
     pub(super) fn near_enough(&self, x_m: f64, arc_m: f64, within_m: f64, enough_m: f64) -> Option<Nearest> {
         let enough2 = if enough_m > 0.0 { enough_m * enough_m } else { -1.0 };
         self.near(x_m, arc_m, within_m, enough2)
@@ -175,7 +181,7 @@ impl Window {
         let arc_m = arc_m - turn * self.perimeter_m;
         let mut best = Search { x_m, arc_m, limit2: within_m * within_m, enough2, found: None };
         let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
-        // Outwards from the point's row, one row to either side at a time.
+        // The search proceeds outwards from the point's row, by one row to either side at a time.
         self.look_in_row(centre, &mut best);
         for ring in 1..self.rows {
             if best.is_enough() {
@@ -196,12 +202,12 @@ impl Window {
         Some(Nearest { x_m: spot.x_m, arc_m: spot.arc_m, turns, distance2: best.limit2 })
     }
 
-    /// Searches a row near a point; false if the whole row is out of range.
+    /// Searches a row near a point; returns false if the whole row is out of range.
     fn look_in_row(&self, row: usize, best: &mut Search) -> bool {
         let low = self.from_m + row as f64 * self.cell_m - best.x_m;
         let away = low.max(-(low + self.cell_m)).max(0.0);
         let width2 = best.limit2 - away * away;
-        // Margin for rounding of the row's edges.
+        // The margin allows for rounding of the row's edges.
         if width2 < -1e-9 {
             return false;
         }
@@ -211,7 +217,7 @@ impl Window {
             self.look_all_round(first, best);
             return true;
         }
-        // Shifted by one turn, so that no column is negative.
+        // The shift by one turn keeps column numbers non-negative.
         let on_m = best.arc_m + self.perimeter_m;
         let [_, _, per_column] = self.per_m;
         let (left, right) = (whole((on_m - width_m) * per_column), whole((on_m + width_m) * per_column));
@@ -230,7 +236,7 @@ impl Window {
         true
     }
 
-    /// Samples of a range of cells in a row.
+    /// Returns the samples of a range of cells in a row.
     fn spots(&self, from: usize, to: usize) -> &[Spot] {
         let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return &[] };
         self.spots.get(*begin as usize..*end as usize).unwrap_or_default()
@@ -278,7 +284,7 @@ struct Search {
 }
 
 impl Search {
-    /// Takes a sample that is nearer than the one found. Returns whether it is nearer.
+    /// Keeps a sample if it is nearer than the one found, and returns whether it is.
     fn takes(&mut self, spot: &Spot, turns: f64, distance2: f64) -> bool {
         let is_nearer = distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none());
         if is_nearer {
@@ -287,7 +293,7 @@ impl Search {
         is_nearer
     }
 
-    /// Whether the sample found is near enough to stop the search.
+    /// Whether the found sample is near enough to stop the search.
     fn is_enough(&self) -> bool {
         self.limit2 <= self.enough2 && self.found.is_some()
     }

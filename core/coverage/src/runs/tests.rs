@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs, and the section states for checking them.
+/// Runs, with the section states against which they are checked.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
@@ -29,7 +29,7 @@ impl Rig {
 
     fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        // A speed can mend all but the largest holes.
+        // A speed helps for all but the largest holes.
         let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
         let failing = causes.map(|causes| Failing { causes, again_mps });
         (self.failing[slot], self.holes[slot]) = (failing, diameter_m);
@@ -103,17 +103,17 @@ impl Rig {
 }
 
 #[test]
-fn run_grows_merges_and_is_cleared() {
+fn runs_grow_and_merge_and_are_cleared() {
     let mut rig = Rig::new();
     rig.say(10, Some(Cause::TooFast), 1.0);
     rig.say(11, Some(Cause::TooFast), 1.5);
     rig.say(16, Some(Cause::TooFast), 1.2);
-    // This section is within half a metre of both runs.
+    // Section 14 is within half a metre of both runs.
     rig.say(14, Some(Cause::Phase), 1.1);
     let first = *rig.runs.get(RunId(0)).unwrap();
     assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
     assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
-    // The last sections that would still join on either side, and the first that wouldn't.
+    // On either side, the last section that would still join the run, and the first that would not.
     assert_eq!([6, 7, 19, 20].map(|section| rig.runs.is_beyond(&first, section)), [true, false, false, true]);
     for section in [10, 11, 14, 16] {
         rig.say(section, None, 0.2);
@@ -123,7 +123,7 @@ fn run_grows_merges_and_is_cleared() {
 }
 
 #[test]
-fn run_has_its_most_frequent_cause_and_names_the_next() {
+fn most_frequent_cause_of_a_run_is_its_main_cause() {
     let mut rig = Rig::new();
     let run = |rig: &Rig| *rig.runs.get(RunId(0)).unwrap();
     rig.say(0, Some(Cause::Occluded), 1.0);
@@ -137,7 +137,7 @@ fn run_has_its_most_frequent_cause_and_names_the_next() {
         rig.say(section, Some(Cause::TooFast), 1.0);
     }
     assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast), "a cause of one section in 22 isn't named");
-    // All sections are judged again.
+    // All sections but the first are judged again.
     for section in 1..22 {
         rig.say(section, Some(Cause::HeadSilent), 1.0);
     }
@@ -146,7 +146,7 @@ fn run_has_its_most_frequent_cause_and_names_the_next() {
 }
 
 #[test]
-fn run_filled_in_its_middle_splits_and_the_first_part_keeps_the_number() {
+fn run_splits_when_its_middle_passes_and_the_first_part_keeps_the_number() {
     let mut rig = Rig::new();
     for section in 0..9 {
         rig.say(section, Some(Cause::MissingReturns), 0.6 + 0.1 * section as f64);
@@ -173,7 +173,7 @@ proptest! {
             let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(lost)];
             rig.say_all(section, causes[usize::from(cause)], diameter_m);
         }
-        // Many changes may exhaust the run numbers. Sections are then in no run.
+        // Many changes may exhaust the run numbers. Some sections then have no run.
         if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {
             rig.check();
         }

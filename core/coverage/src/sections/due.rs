@@ -1,7 +1,7 @@
 //! Decides which sections are due for judging.
 //!
-//! Due are sections that the heads have left, those of which a part may certainly fail, and at the end all
-//! that aren't settled.
+//! A section is due if the heads have left it, or if a part of it may certainly fail. At the end of a dive, all
+//! sections that aren't settled are due.
 
 use super::super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::super::hole::{FARTHEST_M, Needed};
@@ -9,10 +9,12 @@ use super::super::section::Verdict;
 use super::{Ended, Judging, Request, Sections, clamp};
 use headrace_geometry::math;
 
-/// Distance travelled between two checks of sections left behind, m. It bounds the delay of a flag.
+/// Distance travelled between two checks of sections left behind, m.
+///
+/// This distance bounds the delay of a flag.
 const LOOK_M: f64 = 0.125;
 
-/// Check at the next movement: every finite reach is beyond these limits.
+/// Limits that require a check at the next movement, because every finite reach is beyond them.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Sections {
@@ -25,7 +27,7 @@ impl Sections {
 
     /// Sets the next places to check.
     ///
-    /// Wall behind is left in steps of a part of a section. So is wall ahead when the vehicle goes back.
+    /// Wall behind the vehicle is left in steps of a part of a section. So is wall ahead if the vehicle goes back.
     fn look_again(&mut self, to_come: Option<Reach>) {
         let Some(Reach { from_m, to_m }) = to_come else { return };
         let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
@@ -38,10 +40,10 @@ impl Sections {
         ];
     }
 
-    /// Calls `ask` for every section of the coverage extent due for judging after the heads have moved.
+    /// Calls `ask` for every section of the coverage extent that is due after the heads have moved.
     ///
-    /// These are sections that left the zone or never were in it, those whose hole can get no more samples,
-    /// and those of which a part may certainly fail.
+    /// A section is due if it left the zone or was never in it, if its hole can get no more samples, or if a part of
+    /// it may certainly fail.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -70,8 +72,8 @@ impl Sections {
                 let may_fail = !section.is_flagged() && section.verdict == Verdict::Open;
                 let is_out = index < moved.left_behind.end || index >= moved.left_ahead.start;
                 let Some(hole) = section.hole else {
-                    // Sections of the coverage extent that no head ever reached lie beside the heads, or
-                    // where the vehicle set out.
+                    // Sections of the coverage extent without samples lie beside the heads, or where the vehicle set
+                    // out.
                     let (from_m, to_m) = bounds_m;
                     let clear = clear_of(moved.to_come, from_m).min(clear_of(moved.to_come, to_m)) > 0.0;
                     if !is_out {
@@ -94,11 +96,11 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for sections of the still zone, which otherwise get no verdict while the vehicle is
-    /// stationary.
+    /// Calls `ask` for sections of the still zone.
     ///
-    /// These are sections that may certainly fail although their hole may still get samples, and flagged ones
-    /// with new samples since they were judged.
+    /// Without this call, these sections would get no verdict while the vehicle is stationary. A section is due if it
+    /// may certainly fail although its hole may still get samples, or if it is flagged and has new samples since it
+    /// was judged.
     ///
     /// Allocates: never.
     pub fn look_around(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -113,7 +115,7 @@ impl Sections {
         }
     }
 
-    /// Whether a section already has an empty circle that is too large for the target, with the errors there.
+    /// Whether a section already has an empty circle that is too large for the target, including the errors.
     ///
     /// All heads have passed the circle, and no more samples will land in it.
     pub(super) fn fails_already(&self, request: &Request, judging: &mut Judging<'_>) -> bool {
@@ -142,7 +144,7 @@ impl Sections {
         let ask_for = Request::at(outlook);
         for index in self.sections_of(outlook.way) {
             let Some(section) = self.get_mut(index) else { continue };
-            // Samples too far away to change a pass may still have narrowed the hole of a fail.
+            // Samples too far away to change a pass may have reduced the hole of a failed section.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 ask(Request { ended: Some(Ended(outlook.through)), ..ask_for(index) });
@@ -165,7 +167,7 @@ mod tests {
 
     /// Partly left sections are checked every few centimetres of travel, behind and ahead.
     #[test]
-    fn next_check_is_a_few_centimetres_on() {
+    fn next_check_is_due_after_a_few_centimetres_of_travel() {
         let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
         for k in 0..100 {
             let x_m = 4.0 + 0.013 * f64::from(k);
@@ -179,8 +181,9 @@ mod tests {
         assert_eq!(sections.next_look_m.map(f64::to_bits), LOOK_AT_ONCE.map(f64::to_bits));
     }
 
-    /// Around a stationary vehicle a failed section is judged again only after new samples. Every other
-    /// section may come to fail.
+    /// Around a stationary vehicle, a failed section is judged again only after new samples.
+    ///
+    /// Every other section may come to fail at any time.
     #[test]
     fn stationary_vehicle_judges_sections_with_new_samples() {
         let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
@@ -212,9 +215,9 @@ mod tests {
         assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "no samples since");
     }
 
-    /// Requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on.
+    /// Returns the requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on.
     ///
-    /// Each has the section's index, and whether it is only for a certain fail.
+    /// Each request has the section's index, and whether it is only for a certain fail.
     fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
         let mut sections = Sections::new(0.25, 0.5, 1.0, 10.0);
         set(&mut sections);
@@ -236,7 +239,7 @@ mod tests {
         all
     }
 
-    /// Requests if every section except this one is settled and judged.
+    /// Returns the requests if every section except `index` is settled and judged.
     fn alone(index: i64, set: impl Fn(&mut Section)) -> Vec<(i64, bool)> {
         due(|sections| {
             for other in 4..16 {
@@ -256,8 +259,8 @@ mod tests {
     #[test]
     fn section_left_without_a_verdict_is_judged() {
         let found = due(|_| {});
-        // Everything behind is judged whole. At the zone's ends sections may fail by the part left. Nothing
-        // ahead is judged.
+        // All sections behind the zone are judged completely. At the zone's ends, sections may fail because of the
+        // part that was left. Sections ahead are not judged.
         let mut expected: Vec<_> = (4..12).map(|index| (index, false)).collect();
         expected.extend([(12, true), (15, true)]);
         assert_eq!(found, expected);
@@ -268,10 +271,12 @@ mod tests {
         assert_eq!(alone(9, |section| section.stale = true), [], "the section was left before");
     }
 
-    /// The part of a large hole out of reach, twice as far as its centre, may already be too large. A hole
-    /// fully out of reach is judged finally.
+    /// A hole may fail early because of its part out of reach.
+    ///
+    /// This part measures up to twice the distance of the hole's centre. A hole that lies completely out of reach
+    /// gets its final verdict.
     #[test]
-    fn fillable_hole_is_judged_once_enough_of_it_is_left() {
+    fn hole_in_reach_is_judged_once_enough_of_it_is_out_of_reach() {
         let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
             alone(9, |section| {
                 (section.hole, section.hole_sd_m) = (Some(hole(diameter_m, x_m)), sd_m);
@@ -280,10 +285,10 @@ mod tests {
             })
         };
         let open = Verdict::Open;
-        assert_eq!(at(0.6, 2.3, 0.0, open, false), [(9, false)], "as a whole: it is 0.95 m away");
-        assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of it");
-        assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m for certain");
-        assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of it");
+        assert_eq!(at(0.6, 2.3, 0.0, open, false), [(9, false)], "the whole hole is out of reach");
+        assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of the hole is out of reach");
+        assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m is out of reach for certain");
+        assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of the hole is out of reach");
         assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "no section is open");
         assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "the section is already flagged");
     }
@@ -292,8 +297,8 @@ mod tests {
 
     /// Whether a section with one empty circle certainly fails, in a pipe of 3 m radius.
     ///
-    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw,
-    /// rad. Samples may still land from 0.65 m beyond it, and no head has been there up to 1 m before.
+    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw, rad.
+    /// Samples may still land from `to_come_m` on, and not all heads have passed wall up to 9 m.
     fn fails(circle_m: f64, is_beside: bool, [along_m, yaw_rad]: [f64; 2], to_come_m: f64) -> bool {
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -338,30 +343,34 @@ mod tests {
             tell: &mut |_, _| {},
         };
         let everywhere = Request { not_passed: None, ..request };
-        assert!(!sections.fails_already(&everywhere, &mut judging), "only where some heads haven't passed");
+        assert!(
+            !sections.fails_already(&everywhere, &mut judging),
+            "only wall that some heads missed counts"
+        );
         sections.fails_already(&request, &mut judging)
     }
 
-    /// The limit is three standard deviations of the diameter above the target of 0.5 m. A hole's error is
-    /// 1.2 times that of a pass.
+    /// The limit of the diameter is the target of 0.5 m plus three standard deviations.
+    ///
+    /// The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn unfillable_circle_fails_by_the_errors_at_its_place() {
+    fn limit_of_an_empty_circle_includes_the_errors_at_its_place() {
         for is_beside in [true, false] {
             let fails = |circle_m: f64, errors: [f64; 2]| fails(circle_m, is_beside, errors, 10.9);
             assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "the circle must exceed the target");
-            // 0.5 m plus three times 0.06 m.
+            // The limit is 0.5 m plus three times 0.06 m.
             assert!(!fails(0.335, [0.05, 0.0]) && fails(0.345, [0.05, 0.0]));
         }
-        // A yaw of 0.02 rad moves wall 3 m beside the vehicle by 0.06 m, and wall above it by nothing: 0.5 m
-        // plus three times 0.072 m.
+        // A yaw of 0.02 rad moves wall 3 m beside the vehicle by 0.06 m, and does not move wall above it. The limit
+        // beside the vehicle is 0.5 m plus three times 0.072 m.
         assert!(!fails(0.35, true, [0.0, 0.02], 10.9) && fails(0.365, true, [0.0, 0.02], 10.9));
         assert!(fails(0.265, false, [0.0, 0.02], 10.9));
         for (to_come_m, yaw_rad) in
             [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
         {
-            // Elsewhere on the wall the circle would need to be far larger.
+            // At other places on the wall, the circle would need to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
-        assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in it");
+        assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in the circle");
     }
 }

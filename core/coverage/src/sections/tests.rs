@@ -12,7 +12,7 @@ fn sections() -> Sections {
 }
 
 #[test]
-fn stretch_contains_the_existing_sections_it_touches() {
+fn stretch_contains_all_existing_sections_that_it_touches() {
     let of = |from_m: f64, to_m: f64| sections().sections_of(Some(Reach { from_m, to_m }));
     assert_eq!(of(1.1, 1.9), 4..8);
     assert_eq!(of(1.0, 2.0), 4..9, "both ends at section boundaries");
@@ -21,9 +21,11 @@ fn stretch_contains_the_existing_sections_it_touches() {
     assert!(of(11.0, 12.0).is_empty() && sections().sections_of(None).is_empty());
 }
 
-/// A judged section is counted once, however often its verdict changes. An unjudged one is open.
+/// A judged section is counted once, however often its verdict changes.
+///
+/// A section that is not judged counts as open.
 #[test]
-fn metres_follow_the_latest_verdicts() {
+fn metres_are_counted_by_the_latest_verdicts() {
     let mut sections = sections();
     let [pass, fail] = [Verdict::Pass, Verdict::Fail].map(|verdict| Some(verdict as usize));
     for (before, now) in [(None, fail), (None, fail), (None, fail), (None, pass), (fail, pass), (fail, None)]
@@ -36,10 +38,11 @@ fn metres_follow_the_latest_verdicts() {
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
 }
 
-/// A section with pings has its own error. One without pings has the largest of those within T / 2 of it, and
-/// no other.
+/// A section with pings has its own error.
+///
+/// A section without pings has the largest error of the sections within T / 2, and no other.
 #[test]
-fn section_without_pings_has_the_error_of_its_neighbours() {
+fn section_without_pings_has_the_largest_error_nearby() {
     let error_of = |placed_in: i64, asked: i64| {
         let mut sections = sections();
         for (index, sd_m) in [(placed_in, 0.03), (30, 0.01)] {
@@ -55,7 +58,7 @@ fn section_without_pings_has_the_error_of_its_neighbours() {
         }
     };
     let near = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
-    // Section 20 spans 5 to 5.25 m. The wall within 0.25 m of it spans 4.75 to 5.5 m.
+    // Section 20 spans 5 to 5.25 m. The stretch within 0.25 m of this section spans 4.75 to 5.5 m.
     for (beside, expected) in [(18, 0.0), (19, 0.03), (21, 0.03), (22, 0.03), (23, 0.0)] {
         assert!(near(error_of(beside, 20), expected), "{beside}: {}", error_of(beside, 20));
     }
@@ -70,14 +73,14 @@ fn hole(diameter_m: f64) -> Hole {
 }
 
 #[test]
-fn wall_without_samples_never_passes() {
+fn section_without_samples_never_passes() {
     let hole = Hole { bounded: false, ..hole(2.0 * FARTHEST_M) };
     assert_eq!(verdict(&hole, 0.0, 100.0, BEHIND), Verdict::Fail);
     assert_eq!(verdict(&hole, 0.0, 100.0, 1.0), Verdict::Open);
 }
 
 #[test]
-fn verdict_keeps_the_configured_standard_deviations() {
+fn verdict_requires_the_configured_number_of_standard_deviations() {
     for (confidence_sd, diameter_m, expected) in [
         (1.0, 0.89, Verdict::Pass),
         (1.0, 0.91, Verdict::CannotSay),
@@ -96,7 +99,7 @@ fn verdict_keeps_the_configured_standard_deviations() {
 }
 
 #[test]
-fn fillable_hole_is_open_until_enough_of_it_is_out_of_reach() {
+fn hole_in_reach_is_open_until_enough_of_it_is_out_of_reach() {
     let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
     assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
     let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);
@@ -114,10 +117,10 @@ fn bounds_on_either_side_of_the_target_give_no_verdict() {
     assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
 }
 
-/// Judges a section of a pipe seen by two visits, each with a mesh of samples of this size, m.
+/// Judges a section of a pipe after two visits, each with a mesh of samples of this size, m.
 ///
-/// With `is_related` both visits are of one stretch of navigation. Returns the verdict, the hole's diameter,
-/// m, and the first visit that counts.
+/// With `is_related`, both visits belong to one stretch of navigation. Returns the verdict, the hole's diameter, m,
+/// and the first visit that counts.
 fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();
@@ -133,7 +136,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
             errors: [PassError::default(); 2],
         };
         let around = math::round_to_i64(perimeter_m / mesh_m);
-        // The centre between two rows is that of the section.
+        // The centre between two rows is the centre of the section.
         let rows = math::floor_to_i64(2.0 / mesh_m);
         for (i, k) in (-rows..rows).flat_map(|i| (0..around).map(move |k| (i, k))) {
             let (x_m, arc_m) = (5.125 + mesh_m * (i as f64 + 0.5), perimeter_m / around as f64 * k as f64);
@@ -163,9 +166,11 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     (section.verdict, section.hole.unwrap().diameter_m, section.visits.first())
 }
 
-/// A mesh leaves holes as wide as its diagonal: 0.28 m for 0.2 m, 0.48 m for 0.34 m. The target is 0.5 m.
+/// A mesh leaves holes as wide as its diagonal: 0.28 m for 0.2 m, 0.48 m for 0.34 m.
+///
+/// The target is 0.5 m.
 #[test]
-fn hole_is_of_all_visits_unless_the_newest_alone_passes() {
+fn hole_counts_all_visits_unless_the_newest_visit_alone_passes() {
     let fine_m = 0.2 * math::sqrt(2.0);
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");

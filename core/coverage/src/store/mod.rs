@@ -1,9 +1,9 @@
 //! Samples on the unrolled wall, in bricks of several rows of square cells around the perimeter.
 //!
-//! Bricks near the vehicle are open: they hold unpacked samples, listed by cell. Bricks farther away are
-//! packed to four bytes per sample. A packed brick is opened again when the vehicle comes back or a pass
-//! search needs it. Full cells are thinned, so memory in use grows with the wall seen, not with the time
-//! spent there. All of it is allocated before the loop is armed. The OS maps a page on first use.
+//! Bricks near the vehicle are open: they hold unpacked samples, listed by cell. Bricks farther away are packed to
+//! four bytes per sample. A packed brick is opened again when the vehicle comes back or a pass search needs it. Full
+//! cells are thinned, so memory in use grows with the wall seen, not with the duration of the dive. All memory is
+//! allocated before the loop is armed. The OS maps a page on first use.
 
 mod open;
 mod packed;
@@ -18,15 +18,17 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
 
-/// Number of bricks open at a time. At a metre each they extend beyond any search radius on either side.
+/// Number of bricks open at a time.
+///
+/// Each brick is at least a metre long, so the open bricks extend beyond any search radius on either side.
 const OPEN_BRICKS: usize = 64;
 /// Minimum length of a brick, m.
 const BRICK_M: f64 = 1.0;
-/// Maximum rows per brick: an open brick has a bit for each in a `u32`.
+/// Maximum number of rows per brick: an open brick has a bit for each row in a `u32`.
 const MOST_ROWS: usize = 32;
-/// Sample capacity of the open bricks.
+/// Maximum number of samples in all open bricks.
 const OPEN_SAMPLES: usize = 1 << 18;
-/// Overhead words per brick: unused words in its last block, and head switches.
+/// Overhead words per brick: unused words in the last block, and head switches.
 const WORDS_PER_BRICK: usize = 48;
 
 /// A sample on the unrolled wall.
@@ -40,9 +42,9 @@ pub struct WallSample {
     pub head: usize,
     /// Step from the same head's previous sample, along the tunnel and along the perimeter, m.
     ///
-    /// `None` unless it was a single step of one sweep.
+    /// `None` unless both samples are one step apart in one sweep.
     pub step_m: Option<[f64; 2]>,
-    /// Number of the visit in which it was measured, from zero. It never decreases.
+    /// Number of the visit that measured the sample, from zero. The number never decreases.
     pub visit: u32,
 }
 
@@ -55,14 +57,14 @@ pub struct StoreLayout {
     pub from_m: f64,
     /// Last chainage, m.
     pub to_m: f64,
-    /// Nominal edge of a cell, m. Half the target suits the searches.
+    /// Nominal edge of a cell, m. Half the target is a good value for the searches.
     pub cell_m: f64,
-    /// Minimum capacity, samples.
+    /// Minimum capacity in samples.
     pub capacity: u32,
 }
 
 impl StoreLayout {
-    /// Cell edge that suits searches for holes about as large as the target, m.
+    /// Returns the cell edge, m, that is best for searches for holes about as large as the target.
     pub fn cell_for_target_m(target_m: f64) -> f64 {
         (target_m / 2.0).clamp(0.05, 0.5)
     }
@@ -71,16 +73,16 @@ impl StoreLayout {
 /// Outcome of inserting a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kept {
-    /// Stored.
+    /// The sample was stored.
     Stored,
-    /// Dropped: its cell is full, and a nearby sample represents it.
+    /// The sample was dropped, because its cell is full and a nearby sample represents it.
     Thinned,
 }
 
-/// Reason for which a sample was not kept.
+/// Reason why a sample was not stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
-    /// Its chainage is outside the store's extent, or its coordinates aren't finite.
+    /// The sample's chainage is outside the store's extent, or its coordinates aren't finite.
     #[error("storing a sample: it lies outside the stretch of tunnel that the store covers")]
     Outside,
     /// The store is full.
@@ -88,38 +90,38 @@ pub enum StoreError {
     Full,
 }
 
-/// Bounds on the difference between a stretch's stored samples and those inserted.
+/// Bounds on the difference between the stored samples of a stretch and the inserted ones.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fidelity {
-    /// Maximum distance of a dropped sample from a kept one, m.
+    /// Maximum distance of a dropped sample from a stored one, m.
     pub thinned_m: f64,
-    /// Maximum displacement of a kept sample, m.
+    /// Maximum displacement of a stored sample, m.
     pub moved_m: f64,
 }
 
 /// Contents and memory use of a store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StoreUse {
-    /// Samples kept.
+    /// Number of samples stored.
     pub kept: u64,
-    /// Samples dropped by thinning.
+    /// Number of samples dropped by thinning.
     pub thinned: u64,
-    /// Bytes in use now or before: those mapped by the OS.
+    /// Number of bytes in use now or before, which the OS has mapped.
     pub bytes: usize,
 }
 
 /// A group of cell rows.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Brick {
-    /// Link to its first block in the arena, or zero.
+    /// Link to the brick's first block in the arena, or zero.
     first_block: u32,
-    /// Number of its samples.
+    /// Number of samples in the brick.
     count: u32,
-    /// Slot plus one if it is open, or zero.
+    /// Slot plus one if the brick is open, or zero.
     slot: u16,
     /// Coarsest thinning tier applied.
     tier: u8,
-    /// Whether it has been packed before.
+    /// Whether the brick has been packed before.
     moved: bool,
 }
 
@@ -136,7 +138,7 @@ pub struct SampleStore {
     rows: i64,
     columns: i64,
     column_m: f64,
-    /// Rows of a brick, as a power of two.
+    /// Number of rows of a brick, as a power of two.
     rows_shift: u32,
     bricks: Vec<Brick>,
     open: OpenBricks,
@@ -150,7 +152,7 @@ pub struct SampleStore {
 stateful!(SampleStore { state: open, arena, longest_step_m, kept, thinned; slots: bricks; fixed: layout, rows, columns, column_m, rows_shift; });
 
 impl SampleStore {
-    /// An empty store.
+    /// Creates an empty store.
     ///
     /// Allocates: at startup, all that it will ever use.
     pub fn new(layout: StoreLayout) -> Self {
@@ -162,7 +164,7 @@ impl SampleStore {
         let bricks = to_usize(rows).div_ceil(rows_per_brick);
         let capacity = layout.capacity as usize;
         let open_samples = OPEN_SAMPLES.min(capacity);
-        // Nearly all samples take one word. Open ones are budgeted at the maximum.
+        // Nearly all packed samples take one word. The open samples are budgeted at the maximum number of words.
         let words = capacity
             + capacity / 8
             + MOST_WORDS * (open_samples + 1)
@@ -182,8 +184,9 @@ impl SampleStore {
         }
     }
 
-    /// Frees all samples and their memory. Nothing can be stored afterwards. The count of thinned samples
-    /// remains.
+    /// Frees all samples and their memory.
+    ///
+    /// Nothing can be stored afterwards. The number of thinned samples remains available.
     pub fn release(&mut self) {
         let layout = StoreLayout { to_m: self.layout.from_m, capacity: 0, ..self.layout };
         *self = Self { thinned: self.thinned, ..Self::new(layout) };
@@ -194,12 +197,12 @@ impl SampleStore {
         self.layout.perimeter_m
     }
 
-    /// Whether a point is within the store's extent and finite.
+    /// Whether a point is finite and within the store's extent.
     pub fn covers(&self, x_m: f64, arc_m: f64) -> bool {
         self.row(x_m).is_some() && arc_m.is_finite()
     }
 
-    /// Current contents and memory use.
+    /// Returns the current contents and memory use.
     pub fn usage(&self) -> StoreUse {
         StoreUse {
             kept: self.kept,
@@ -210,7 +213,7 @@ impl SampleStore {
         }
     }
 
-    /// Stores a sample, unless its cell is full and holds one nearby.
+    /// Stores a sample, unless its cell is full and holds a nearby sample.
     ///
     /// Errors: the sample lies outside, or the store is full.
     /// Allocates: never.
@@ -251,7 +254,7 @@ impl SampleStore {
 
     /// Calls `take` with chainage, arc length, m, and visit number of all samples between two chainages, m.
     ///
-    /// It may include some samples beyond them.
+    /// Some samples beyond the two chainages may be included.
     ///
     /// Allocates: never.
     pub fn each_between(&self, from_m: f64, to_m: f64, mut take: impl FnMut(f64, f64, u32)) {
@@ -282,7 +285,7 @@ impl SampleStore {
         }
     }
 
-    /// Fidelity of the samples between two chainages.
+    /// Returns the fidelity of the samples between two chainages.
     pub fn fidelity(&self, from_m: f64, to_m: f64) -> Fidelity {
         let mut worst = Fidelity::default();
         for number in self.bricks_between(from_m, to_m) {
@@ -296,7 +299,7 @@ impl SampleStore {
     }
 
     fn bricks_between(&self, from_m: f64, to_m: f64) -> core::ops::RangeInclusive<u32> {
-        // A sample near the edge of a brick may have been moved beyond it.
+        // Packing may have moved a sample near the edge of a brick beyond this edge.
         self.brick_of(self.row_near(from_m - packed::MOVED_M))
             ..=self.brick_of(self.row_near(to_m + packed::MOVED_M))
     }
@@ -310,7 +313,9 @@ impl SampleStore {
         Lattice::new(from_m, self.layout.perimeter_m)
     }
 
-    /// Slot of a brick; opens it if it is packed, or if it is empty and `wanted`.
+    /// Returns the slot of a brick.
+    ///
+    /// The function opens the brick if it is packed, or if it is empty and `wanted`.
     fn opened(&mut self, number: u32, wanted: bool) -> Option<usize> {
         let brick = *self.bricks.get(number as usize)?;
         if brick.slot > 0 || (brick.count == 0 && !wanted) {
@@ -376,7 +381,7 @@ impl SampleStore {
         Some(slot)
     }
 
-    /// The longer edge of a cell, m.
+    /// Length of the longer edge of a cell, m.
     fn edge_m(&self) -> f64 {
         self.layout.cell_m.max(self.column_m)
     }
@@ -386,7 +391,7 @@ impl SampleStore {
         inside.then(|| self.row_near(x_m))
     }
 
-    /// The row at a chainage, or the one nearest to it.
+    /// Returns the row at a chainage, or the row nearest to it.
     fn row_near(&self, x_m: f64) -> i64 {
         math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m).clamp(0, self.rows - 1)
     }

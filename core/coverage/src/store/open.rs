@@ -6,7 +6,7 @@ use super::packed::Packed;
 use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
 
-/// List link: node index plus one, or zero for none.
+/// List link: index of a node plus one, or zero for none.
 type Link = u32;
 
 /// A sample in the pool.
@@ -25,7 +25,7 @@ pub(super) struct Node {
 }
 
 impl Node {
-    /// The node's sample.
+    /// Sample of the node.
     pub(super) fn sample(&self) -> Packed {
         let Self { x_m, arc_m, step_m, visit, .. } = *self;
         Packed { x_m, arc_m, step_m, visit }
@@ -35,7 +35,7 @@ impl Node {
 /// A cell of an open brick.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CellAt {
-    /// The brick's slot.
+    /// Slot of the brick.
     pub slot: usize,
     /// Row within the brick.
     pub row: usize,
@@ -43,34 +43,34 @@ pub(super) struct CellAt {
     pub column: usize,
 }
 
-/// A cell's samples.
+/// List of a cell's samples.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Cell {
     latest: Link,
     count: u32,
 }
 
-/// A head's samples of a brick, in order of arrival.
+/// List of a head's samples in a brick, in order of arrival.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Chain {
     first: Link,
     last: Link,
 }
 
-/// A fixed number of open bricks with a common sample pool.
+/// A fixed number of open bricks with a common pool of samples.
 #[derive(Debug, Clone)]
 pub(super) struct OpenBricks {
     rows: usize,
     columns: usize,
     cells: Vec<Cell>,
-    /// Bitmask, for each column of a slot, of the rows that have samples.
+    /// Bitmask of the rows that have samples, for each column of a slot.
     rows_seen: Vec<u32>,
     chains: Vec<[Chain; MAX_HEADS]>,
     /// Brick in each slot.
     bricks: Vec<Option<u32>>,
     nodes: Vec<Node>,
     most_nodes: usize,
-    /// Free list of nodes, linked as in a cell.
+    /// Free list of nodes, linked like the list of a cell.
     free: Link,
     used: usize,
 }
@@ -94,7 +94,7 @@ impl OpenBricks {
         }
     }
 
-    /// Free capacity, samples.
+    /// Number of samples for which there is room.
     pub(super) fn room(&self) -> usize {
         self.most_nodes - self.used
     }
@@ -104,17 +104,17 @@ impl OpenBricks {
         self.used
     }
 
-    /// Bytes in use now or before.
+    /// Number of bytes in use now or before.
     pub(super) fn touched_bytes(&self) -> usize {
         self.nodes.len() * size_of::<Node>() + self.cells.len() * size_of::<Cell>()
     }
 
-    /// A slot without a brick.
+    /// Returns a slot without a brick.
     pub(super) fn free_slot(&self) -> Option<usize> {
         self.bricks.iter().position(Option::is_none)
     }
 
-    /// Slot and number of the open brick farthest from another one.
+    /// Returns slot and number of the open brick that is farthest from the brick `number`.
     pub(super) fn farthest_from(&self, brick: u32) -> Option<(usize, u32)> {
         let held = self.bricks.iter().enumerate().filter_map(|(slot, held)| Some((slot, (*held)?)));
         held.filter(|(_, held)| *held != brick).max_by_key(|(_, held)| held.abs_diff(brick))
@@ -127,7 +127,7 @@ impl OpenBricks {
         }
     }
 
-    /// Adds a sample of a head to a cell of a slot; false if there is no room.
+    /// Adds a sample of a head to a cell of a slot; returns false if there is no room.
     pub(super) fn add(&mut self, at: CellAt, head: usize, sample: &Packed) -> bool {
         let Packed { x_m, arc_m, step_m, visit } = *sample;
         let index = self.index(at);
@@ -166,7 +166,7 @@ impl OpenBricks {
         (at.slot * self.rows + at.row) * self.columns + at.column
     }
 
-    /// Bitmask of the rows of a slot that have samples in a column.
+    /// Returns the bitmask of the rows of a slot that have samples in a column.
     pub(super) fn rows_seen(&self, slot: usize, column: usize) -> u32 {
         self.rows_seen.get(slot * self.columns + column).copied().unwrap_or(0)
     }
@@ -176,13 +176,13 @@ impl OpenBricks {
         self.cells.get(self.index(at)).map_or(0, |list| list.count)
     }
 
-    /// Samples of a cell of a slot, latest first.
+    /// Returns the samples of a cell of a slot, latest first.
     pub(super) fn in_cell(&self, at: CellAt) -> impl Iterator<Item = &Node> {
         let latest = self.cells.get(self.index(at)).map_or(0, |list| list.latest);
         self.list(latest, |node| node.next_in_cell)
     }
 
-    /// Samples of a head in a slot, earliest first.
+    /// Returns the samples of a head in a slot, earliest first.
     pub(super) fn of_head(&self, slot: usize, head: usize) -> impl Iterator<Item = &Node> {
         let chain = self.chains.get(slot).and_then(|chains| chains.get(head));
         self.list(chain.map_or(0, |chain| chain.first), |node| node.next_of_head)

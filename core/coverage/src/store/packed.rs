@@ -1,9 +1,9 @@
 //! Packed samples away from the vehicle, four bytes each.
 //!
-//! The samples of a brick lie in a chain of blocks, head by head in order of arrival. Most take one word: the
-//! difference from the previous sample, in quanta of 2^-17 m. Quanta count from chainage and arc length zero
-//! of the brick. All samples thus share one lattice, on which a step ends exactly where the next begins. An
-//! unpacked sample is packed again without further loss.
+//! The samples of a brick lie in a chain of blocks, head by head in order of arrival. Most samples take one word: the
+//! difference from the previous sample, in quanta of 2^-17 m. Quanta are counted from chainage and arc length zero of
+//! the brick. All samples thus share one lattice, on which a step ends exactly where the next step begins. If an
+//! unpacked sample is packed again, there is no further loss.
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
@@ -13,19 +13,20 @@ use headrace_sampling::head::MAX_HEADS;
 const QUANTA_PER_M: f64 = 131_072.0;
 /// Maximum displacement of a sample by packing, m.
 ///
-/// It is half a quantum along the tunnel, and one along the perimeter, whose last quantum is partial.
+/// The displacement is up to half a quantum along the tunnel, and one quantum along the perimeter, whose last quantum
+/// is partial.
 pub(super) const MOVED_M: f64 = 8.6e-6;
-/// Sample words per block. One more word links to the next block.
+/// Number of sample words per block; one more word links to the next block.
 pub(super) const ROOM: usize = 31;
-/// Maximum words per sample.
+/// Maximum number of words per sample.
 pub(super) const MOST_WORDS: usize = 7;
-/// Lower half of an escape word, which is no difference.
+/// Lower half of an escape word, which stands for no difference.
 const ESCAPE: u16 = 0x8000;
 const PLACE: u16 = 0;
 const STEPPED: u16 = 1;
-/// The next word is the visit number of the samples that follow.
+/// Tag: the next word is the visit number of the samples that follow.
 const VISIT: u16 = u16::MAX;
-/// Tags from this one on switch heads: `HEAD` plus the head's number.
+/// Tags from this value on switch heads: `HEAD` plus the head's number.
 const HEAD: u16 = 2;
 
 /// Lattice point, quanta: along the tunnel from the start of the brick, and along the perimeter.
@@ -58,7 +59,7 @@ pub(super) struct Packed {
 
 impl Lattice {
     pub(super) fn new(from_m: f64, perimeter_m: f64) -> Self {
-        // The last quantum with its centre below the perimeter.
+        // Returns the last quantum whose centre is below the perimeter.
         let last_arc = math::floor_to_i64(perimeter_m * QUANTA_PER_M - 0.5 - 1e-6).max(0);
         Self { origin: math::floor_to_i64(from_m * QUANTA_PER_M), perimeter_m, last_arc }
     }
@@ -70,13 +71,15 @@ impl Lattice {
         }
     }
 
-    /// Centre of a quantum, m.
+    /// Returns the centre of a quantum, m.
     fn place_m(&self, spot: Spot) -> (f64, f64) {
         (((self.origin + spot.x) as f64 + 0.5) / QUANTA_PER_M, (spot.arc as f64 + 0.5) / QUANTA_PER_M)
     }
 }
 
-/// Difference word for a sample close to the previous one; `None` if it is too far away.
+/// Returns the difference word for a sample close to the previous one.
+///
+/// `None` if the sample is too far away.
 fn difference(from: Spot, to: Spot, stepped: bool) -> Option<u32> {
     let along = i16::try_from(to.x - from.x).ok().filter(|along| (-0x4000..0x4000).contains(along))?;
     let around = i16::try_from(to.arc - from.arc).ok().filter(|around| *around != i16::MIN)?;
@@ -93,7 +96,7 @@ fn escape(tag: u16) -> u32 {
 pub(super) struct Arena {
     blocks: Vec<[u32; ROOM + 1]>,
     most: usize,
-    /// First free block: index plus one, or zero.
+    /// First free block: index of the block plus one, or zero.
     free: u32,
     used: usize,
 }
@@ -130,12 +133,12 @@ impl Arena {
         Self { blocks: Vec::with_capacity(most_blocks), most: most_blocks, free: 0, used: 0 }
     }
 
-    /// Free capacity, words.
+    /// Number of free words.
     pub(super) fn free_words(&self) -> usize {
         (self.most - self.used) * ROOM
     }
 
-    /// Bytes in use now or before.
+    /// Number of bytes in use now or before.
     pub(super) fn touched_bytes(&self) -> usize {
         self.blocks.len() * size_of::<[u32; ROOM + 1]>()
     }
@@ -185,7 +188,7 @@ impl Arena {
     }
 }
 
-/// Writes a brick.
+/// Writer of a packed brick.
 pub(super) struct Writer<'a> {
     arena: &'a mut Arena,
     lattice: Lattice,
@@ -201,7 +204,7 @@ impl<'a> Writer<'a> {
         Self { arena, lattice, first: 0, block: 0, at: ROOM, before: None, visit: 0 }
     }
 
-    /// Switches to a head; `None` if there is no room.
+    /// Switches to another head; `None` if there is no room.
     pub(super) fn head(&mut self, head: usize) -> Option<()> {
         self.before = None;
         self.word(escape(HEAD + u16::try_from(head).ok()?))
@@ -263,7 +266,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Reads a brick: iterates over head numbers and samples.
+/// Reader of a packed brick: iterates over head numbers and samples.
 pub(super) struct Reader<'a> {
     arena: &'a Arena,
     lattice: Lattice,

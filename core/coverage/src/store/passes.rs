@@ -1,4 +1,4 @@
-//! The nearest pass: the closest crossing of an arc length by a head.
+//! The nearest pass: the closest place where a head crosses an arc length.
 
 use core::ops::Range;
 
@@ -16,7 +16,9 @@ struct Place {
 }
 
 impl Place {
-    /// Distance in chainage to the place where a sample's step crosses the arc length, if it does, m.
+    /// Returns the distance in chainage to the place where a sample's step crosses the arc length, m.
+    ///
+    /// `None` if the step does not cross the arc length.
     fn to_crossing_m(self, end: &Node) -> Option<f64> {
         let [along_m, around_m] = end.step_m;
         let mut to_end = end.arc_m - self.arc_m;
@@ -26,27 +28,27 @@ impl Place {
             to_end += self.perimeter_m;
         }
         let to_start = to_end - around_m;
-        // The start point belongs to the previous step.
+        // The start point of a step belongs to the previous step.
         let crosses = (to_start < 0.0 && to_end >= 0.0) || (to_start > 0.0 && to_end <= 0.0);
         crosses.then(|| (end.x_m - along_m * (to_end / around_m) - self.x_m).abs())
     }
 }
 
-/// Brick that a search has reached on one side.
+/// A brick that a search has reached on one side.
 #[derive(Debug, Clone, Copy, Default)]
 struct Side {
     brick: Option<u32>,
     slot: usize,
-    /// Bitmask of its rows that may have a pass.
+    /// Bitmask of the brick's rows that may have a pass.
     rows: u32,
 }
 
 impl SampleStore {
-    /// Distance in chainage to the nearest pass over `arc_m` within `within_m`, m.
+    /// Returns the distance in chainage to the nearest pass over `arc_m` within `within_m`, m.
     ///
-    /// It is accurate to some micrometres if a packed brick had to be opened. A pass is a single step of a
-    /// head from one sample to the next. Its chainage at `arc_m` is interpolated. Source:
-    /// docs/reference/glossary.md, "Spacing and holes", T_x.
+    /// The distance is accurate to some micrometres if a packed brick had to be opened. A pass is a single step of a
+    /// head from one sample to the next. The chainage of the pass at `arc_m` is interpolated.
+    /// Source: docs/reference/glossary.md, "Spacing and holes", T_x.
     ///
     /// Allocates: never.
     pub fn nearest_pass_m(&mut self, x_m: f64, arc_m: f64, within_m: f64) -> Option<f64> {
@@ -55,7 +57,7 @@ impl SampleStore {
         let centre = math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m);
         let into_row = (x_m - self.layout.from_m) - centre as f64 * self.layout.cell_m;
         let inner = into_row.min(self.layout.cell_m - into_row).max(0.0);
-        // A step ends at most its own length from the place where it crosses the arc length.
+        // The end of a step is at most one step length away from the place where the step crosses the arc length.
         let [along_m, around_m] = self.longest_step_m;
         let left = math::floor_to_i64((place.arc_m - around_m) / self.column_m);
         let right = math::floor_to_i64((place.arc_m + around_m) / self.column_m);
@@ -92,7 +94,7 @@ impl SampleStore {
         best
     }
 
-    /// Opens a brick and finds its rows that have samples in a range of columns.
+    /// Opens a brick and finds the rows that have samples in a range of columns.
     fn side(&mut self, brick: u32, columns: &Range<i64>) -> Side {
         let Some(slot) = self.opened(brick, false) else {
             return Side { brick: Some(brick), slot: 0, rows: 0 };

@@ -9,7 +9,9 @@ fn sample(x_m: f64, arc_m: f64) -> WallSample {
     WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }
 }
 
-/// Samples of several heads in single steps from point to point. The first sample of each head has no step.
+/// Creates samples of several heads, each in single steps from point to point.
+///
+/// The first sample of each head has no step.
 fn steps(places: &[(f64, f64)], heads: usize) -> Vec<WallSample> {
     let mut last = vec![None; heads];
     let mut all = Vec::new();
@@ -31,7 +33,7 @@ fn store(samples: &[WallSample]) -> SampleStore {
     store
 }
 
-/// Opens so many other bricks that none of the first 40 m stays open.
+/// Opens so many other bricks that all bricks of the first 40 m are packed.
 fn pack_the_first_40_m(store: &mut SampleStore) {
     for k in 0..100 {
         store.insert(sample(210.0 - 1.2 * f64::from(k), 0.0)).unwrap();
@@ -39,7 +41,7 @@ fn pack_the_first_40_m(store: &mut SampleStore) {
     assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all bricks must be packed");
 }
 
-/// Kept samples of the first 40 m, sorted.
+/// Stored samples of the first 40 m, sorted.
 fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
     store.each_between(-1.0, 40.0, |x_m, arc_m, _| kept.push((x_m, arc_m)));
@@ -48,7 +50,9 @@ fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Distances in chainage from a point to every crossing of its arc length, by interpolating each step.
+/// Distances in chainage from a point to every crossing of the point's arc length.
+///
+/// The crossings are interpolated on each step.
 fn crossings(samples: &[WallSample], (x_m, arc_m): (f64, f64)) -> Vec<f64> {
     let mut found = Vec::new();
     for end in samples {
@@ -74,7 +78,7 @@ fn places(most: usize) -> impl Strategy<Value = Vec<(f64, f64)>> {
 }
 
 proptest! {
-    /// Against brute force over every step.
+    /// The reference is brute force over every step.
     #[test]
     fn nearest_pass_agrees_with_brute_force(
         places in places(60),
@@ -91,10 +95,11 @@ proptest! {
         }
     }
 
-    /// Passes in packed bricks are found to the accuracy of packing. Steps are as short as those of real
-    /// heads, so interpolation along a step doesn't amplify the error.
+    /// Passes in packed bricks are found to the accuracy of packing.
+    ///
+    /// Steps are as short as those of real heads, so interpolation along a step doesn't amplify the error.
     #[test]
-    fn passes_survive_packing(
+    fn packed_passes_are_found_to_the_accuracy_of_packing(
         starts in proptest::collection::vec((0.0f64..12.0, 0.0f64..PERIMETER_M, -0.06f64..0.06), 1..8),
         place in (-1.0f64..13.0, 0.0f64..PERIMETER_M),
     ) {
@@ -106,7 +111,7 @@ proptest! {
                 samples.push(WallSample { x_m: x_m + 0.002 * f64::from(k), arc_m, head, step_m, visit: 0 });
             }
         }
-        // At the end of a step, micrometres may select another pass.
+        // At the end of a step, an error of micrometres may select another pass.
         prop_assume!(samples.iter().all(|s| (s.arc_m - place.1).abs() > 1e-4));
         prop_assume!(starts.iter().all(|(_, _, around_m)| around_m.abs() > 0.01));
         let expected = crossings(&samples, place).into_iter().filter(|d| *d <= 9.0).min_by(f64::total_cmp);
@@ -124,9 +129,9 @@ proptest! {
         }
     }
 
-    /// Each sample stays within the stated displacement when packed and opened repeatedly.
+    /// Each sample stays within the stated displacement while it is packed and opened repeatedly.
     #[test]
-    fn samples_survive_packing(places in places(200), heads in 1_usize..8, reversed: bool) {
+    fn packed_samples_stay_within_the_stated_displacement(places in places(200), heads in 1_usize..8, reversed: bool) {
         let mut samples = steps(&places, heads);
         if reversed {
             samples.reverse();
@@ -153,9 +158,9 @@ proptest! {
         prop_assert_eq!(kept(&store), once, "no sample moves the second time");
     }
 
-    /// Every dropped sample has a kept one within the stated distance.
+    /// Every dropped sample has a stored sample within the stated distance.
     #[test]
-    fn every_dropped_sample_has_a_kept_one_nearby(
+    fn every_dropped_sample_has_a_stored_one_nearby(
         places in proptest::collection::vec((0.0f64..0.31, 1.0f64..1.31), 400..900),
         packing: bool,
     ) {
@@ -181,9 +186,9 @@ proptest! {
 }
 
 #[test]
-fn pass_is_found_at_the_crossing_of_its_step() {
+fn pass_is_where_the_step_crosses_the_arc_length() {
     let mut store = store(&[sample(1.0, 7.2), sample(1.1, 0.2), sample(3.0, 7.2)]);
-    // From (1.0, 7.2) to (1.3, 0.1), crossing the seam at its centre.
+    // The step from (1.0, 7.2) to (1.3, 0.1) crosses the seam at its centre.
     let step = WallSample { step_m: Some([0.3, 0.2]), ..sample(1.3, 0.1) };
     store.insert(step).unwrap();
     let distance = store.nearest_pass_m(2.0, 0.0, 5.0).unwrap();
@@ -193,7 +198,7 @@ fn pass_is_found_at_the_crossing_of_its_step() {
 }
 
 #[test]
-fn samples_outside_or_beyond_capacity_are_refused() {
+fn samples_outside_the_extent_or_above_the_capacity_are_refused() {
     let layout = StoreLayout { perimeter_m: 3.0, from_m: 0.0, to_m: 1.0, cell_m: 0.25, capacity: 1 };
     let mut store = SampleStore::new(layout);
     let sample = sample(0.5, 1.0);
@@ -207,7 +212,7 @@ fn samples_outside_or_beyond_capacity_are_refused() {
     assert_eq!(store.insert(sample), Err(StoreError::Full));
 }
 
-/// Refused samples are reported. Kept ones remain.
+/// Refused samples are reported, and stored samples remain.
 #[test]
 fn full_store_keeps_all_stored_samples() {
     let mut store = SampleStore::new(StoreLayout { capacity: 3_000, ..LAYOUT });
@@ -227,7 +232,7 @@ fn full_store_keeps_all_stored_samples() {
 
 /// Four heads at 50 pings per second spend an hour on one spot, with centimetre jitter.
 #[test]
-fn stationary_vehicle_fills_its_cells_only() {
+fn stationary_vehicle_stops_using_more_memory() {
     let mut store = SampleStore::new(LAYOUT);
     let (mut hashed, mut after_half) = (1_u64, None);
     let mut noise_m = || {
@@ -253,12 +258,12 @@ fn stationary_vehicle_fills_its_cells_only() {
     assert!(store.fidelity(100.0, 100.0).thinned_m <= 0.02);
 }
 
-/// A full cell drops a step only if a nearby one has the same direction, which distinguishes passes.
+/// A full cell drops a step only if a nearby step has the same direction, which distinguishes passes.
 #[test]
-fn step_is_dropped_only_for_one_in_its_direction() {
+fn step_is_dropped_only_near_a_step_in_the_same_direction() {
     let mut store = SampleStore::new(LAYOUT);
     let mut goes = |around_m: f64, k: u32| {
-        // Spread over a decimetre of one cell, a millimetre apart.
+        // The samples are spread over a decimetre of one cell, a millimetre apart.
         let off_m = 0.001 * f64::from(k % 100);
         let before = store.usage().thinned;
         store.insert(WallSample { step_m: Some([0.002, around_m]), ..sample(100.1, 3.05 + off_m) }).unwrap();
@@ -270,7 +275,7 @@ fn step_is_dropped_only_for_one_in_its_direction() {
     assert!(goes(0.05, 17));
 }
 
-/// Memory and error don't grow when the vehicle drives back and forth over one section.
+/// Memory and error do not grow while the vehicle drives back and forth over one stretch.
 #[test]
 fn hundred_passes_back_and_forth_do_not_grow_memory() {
     let mut store = SampleStore::new(LAYOUT);
@@ -278,7 +283,7 @@ fn hundred_passes_back_and_forth_do_not_grow_memory() {
     for round in 0..100 {
         for k in 0..500 {
             let k = if round % 2 == 0 { k } else { 499 - k };
-            // 150 m forth and back, so that the beginning is packed and opened each time.
+            // The vehicle drives 150 m back and forth, so that the beginning is packed and opened each time.
             let x_m = 0.3 * f64::from(k);
             store.nearest_pass_m(x_m, 1.0, 12.0);
             let arc_m = (f64::from(k) * 0.045 + f64::from(round % 7) * 1e-3) % PERIMETER_M;
@@ -319,7 +324,7 @@ fn samples_keep_their_visits_when_packed() {
     assert_eq!(visits(&store), before);
 }
 
-/// One stretch may hold as many samples as fit into the open bricks.
+/// One stretch may hold as many samples as fit into all open bricks.
 #[test]
 fn stretch_that_fills_all_open_bricks_is_opened_again() {
     let mut store = SampleStore::new(StoreLayout { capacity: 4, ..LAYOUT });
@@ -333,12 +338,12 @@ fn stretch_that_fills_all_open_bricks_is_opened_again() {
         store.bricks.iter().take(30).all(|brick| brick.slot == 0),
         "it must be packed for the distant sample"
     );
-    // The step from 2.2 to 2.3 m crosses at its centre.
+    // The step from 2.2 to 2.3 m crosses the arc length at its centre.
     let distance = store.nearest_pass_m(1.5, 2.25, 5.0).unwrap();
     assert!((distance - 0.475).abs() < 3e-5, "{distance}");
 }
 
-/// Samples of a turning head take four bytes each once packed, in single steps or not.
+/// Packed samples of a turning head take four bytes each, whether they are in single steps or not.
 #[test]
 fn packed_sweep_takes_one_word_per_sample() {
     for is_stepped in [true, false] {
@@ -363,9 +368,9 @@ fn cell_edge_is_half_the_target_within_limits() {
     }
 }
 
-/// A pass is found at its place, wherever the wall begins.
+/// A pass is found at its place, at whatever chainage the wall begins.
 #[test]
-fn pass_is_found_at_its_place() {
+fn pass_is_found_at_its_chainage_wherever_the_wall_begins() {
     for from_m in [-1.0, 0.0, 6000.0] {
         let layout = StoreLayout { from_m, to_m: from_m + 40.0, ..LAYOUT };
         let mut store = SampleStore::new(layout);
@@ -381,9 +386,9 @@ fn pass_is_found_at_its_place() {
     }
 }
 
-/// The very end of the wall belongs to its last row.
+/// The end of the wall belongs to the last row.
 #[test]
-fn sample_at_the_very_end_is_found() {
+fn sample_at_the_end_of_the_wall_is_found() {
     let layout = StoreLayout { from_m: 0.0, to_m: 10.0, cell_m: 0.25, ..LAYOUT };
     let mut store = SampleStore::new(layout);
     for (k, x_m) in [9.4, 10.0].into_iter().enumerate() {

@@ -1,26 +1,27 @@
-//! Thinning of full cells: samples close enough to a kept one are dropped.
+//! Thinning of full cells: samples close enough to a stored sample are dropped.
 //!
-//! A hole is overestimated by at most twice that distance. Thinning gets coarser as a cell fills, down to a
-//! sixteenth of the cell, so a cell holds some hundreds of samples at most.
+//! A hole is overestimated by at most twice this distance. Thinning gets coarser while a cell fills, up to a
+//! sixteenth of the cell's edge, so a cell holds at most some hundreds of samples.
 
 use super::open::{CellAt, OpenBricks};
 
-/// Thinning tiers: samples in the cell from which the tier applies, and its distance as a share of the cell's
-/// edge.
+/// Thinning tiers: a number of samples in the cell, and a share of the cell's edge.
 ///
-/// Samples closer than that to a kept one are dropped.
+/// A tier applies from its number of samples on. It drops samples closer than its share to a stored sample.
 const TIERS: [(u32, f64); 4] = [(64, 1.0 / 128.0), (96, 1.0 / 64.0), (128, 1.0 / 32.0), (160, 1.0 / 16.0)];
 
-/// Additional samples in a cell before samples at the end of a step are thinned.
+/// Additional number of samples in a cell before samples at the end of a step are thinned.
 const PASSES: u32 = 64;
 
-/// Maximum distance of a dropped sample from a kept one after thinning up to a tier, m; zero for tier 0.
+/// Maximum distance of a dropped sample from a stored one after thinning up to a tier, m.
+///
+/// Zero for tier 0.
 pub(super) fn delta_m(tier: u8, edge_m: f64) -> f64 {
     let tier = usize::from(tier).checked_sub(1).and_then(|tier| TIERS.get(tier));
     tier.map_or(0.0, |(_, share)| share * edge_m)
 }
 
-/// Tier by which a sample may be dropped from its cell; `None` to keep it.
+/// Returns the tier by which a sample may be dropped from its cell; `None` to store the sample.
 pub(super) fn stands_for(
     open: &OpenBricks,
     at: CellAt,
@@ -28,7 +29,7 @@ pub(super) fn stands_for(
     step_m: Option<[f64; 2]>,
     edge_m: f64,
 ) -> Option<u8> {
-    // A step is a pass. It is dropped later, and only if a nearby step in the same direction represents it.
+    // A step is a pass, so it is dropped later, and only if a nearby step in the same direction represents it.
     let around_m = step_m.map_or(0.0, |[_, around_m]| around_m);
     let count = open.count(at).saturating_sub(if step_m.is_some() { PASSES } else { 0 });
     let tier = TIERS.iter().take_while(|(from, _)| count >= *from).count();

@@ -6,23 +6,24 @@ use crate::wall_limits::{PlacedReturn, WallLimits};
 
 /// Maximum number of waiting returns.
 pub const MOST_WAITING: usize = 24;
-/// Ratio of distance from the wall to width above which a run with a jump to the wall on both sides is no
-/// wall.
+/// Ratio of distance from the wall to width above which a run is no wall.
 ///
-/// It hangs in the water, or is an echo off two walls. Rocks, heaps, niches and caves are about as wide as
-/// they are high or deep, and side tunnels are seen as deep as they are wide. Tuned on the field table's
-/// murk: clusters of returns there are at least 12 times as far from the wall as they are wide.
+/// The run has a jump to the wall on both sides. It hangs in the water, or is an echo off two walls. Rocks, heaps,
+/// niches and caves are about as wide as they are high or deep. Side tunnels appear as deep as they are wide.
+///
+/// Tuned on the murk of the field table: clusters of returns in it are at least 12 times as far from the wall as they
+/// are wide.
 const SLENDER: f64 = 4.0;
 
-/// A run of returns; see the module's description.
+/// A run of returns, as described in the parent module.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Run {
     waiting: [PlacedReturn; MOST_WAITING],
     waits: u8,
-    /// First return, including those of the run already given up, and the number of returns.
+    /// First return of the run, including returns that no longer wait, and number of returns.
     first: Option<PlacedReturn>,
     all: u32,
-    /// Largest distance from the design, and width, m.
+    /// Largest distance of the run from the design, and its width, m.
     off_m: f64,
     width_m: f64,
 }
@@ -33,7 +34,7 @@ impl Run {
         u32::from(self.waits)
     }
 
-    /// Waiting returns.
+    /// Returns the waiting returns.
     pub(super) fn returns(&self) -> impl Iterator<Item = &PlacedReturn> {
         self.waiting.iter().take(usize::from(self.waits))
     }
@@ -43,7 +44,7 @@ impl Run {
         let first = *self.first.get_or_insert(*placed);
         self.all += 1;
         self.off_m = self.off_m.max(placed.off_m.abs());
-        // Each return represents a step to either side.
+        // Each return stands for a step, half of it on either side.
         let steps = f64::from(self.all.max(2)) / f64::from(self.all.max(2) - 1);
         self.width_m = self.width_m.max(steps * limits.width_m(&first, placed));
         if let Some(slot) = self.waiting.get_mut(usize::from(self.waits)) {
@@ -62,7 +63,7 @@ impl Run {
         usize::from(self.waits) == MOST_WAITING
     }
 
-    /// Gives up the waiting returns except the last one.
+    /// Removes the waiting returns except the last one.
     pub(super) fn give_up(&mut self, last: &PlacedReturn) {
         self.waiting[0] = *last;
         self.waits = 1;

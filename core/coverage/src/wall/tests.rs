@@ -5,7 +5,7 @@ use headrace_geometry::math::{self, TAU};
 
 const STEPS: u32 = 150;
 
-/// Heads that turn together, evenly spread, while the vehicle moves on.
+/// Heads that turn together, evenly spread, on a moving vehicle.
 struct Turning {
     limits: WallLimits,
     relief: Relief,
@@ -33,10 +33,10 @@ impl Turning {
         }
     }
 
-    /// Runs some turns.
+    /// Simulates some turns.
     ///
-    /// `heard` is the range from the centre that a head measures, by head, chainage, angle, and the numbers
-    /// of turn and step; `None` if it hears nothing.
+    /// `heard` returns the range from the centre that a head measures, for head, chainage, angle, and the numbers of
+    /// turn and step; `None` without a return.
     fn turn(&mut self, turns: u32, heard: impl Fn(usize, f64, f64, [u32; 2]) -> Option<f64>) -> Vec<Count> {
         let radius_m = self.limits.radius_m;
         let mut counts = vec![Count::default(); self.heads.len()];
@@ -67,7 +67,7 @@ impl Turning {
         counts
     }
 
-    /// Checks that nothing of a single head is doubtful.
+    /// Checks that no return is doubtful and no head is distrusted.
     #[track_caller]
     fn all_wall(mut self, turns: u32, wall_m: impl Fn(f64, f64) -> f64) {
         for count in self.turn(turns, |_, x_m, angle, _| Some(wall_m(x_m, angle))) {
@@ -77,7 +77,7 @@ impl Turning {
     }
 }
 
-/// Pseudo-random number from -1 to 1, the same for the same inputs.
+/// Pseudo-random number from -1 to 1, determined by its inputs.
 fn noise(a: u32, b: u32) -> f64 {
     let mixed = (u64::from(a) << 32 | u64::from(b)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -85,22 +85,22 @@ fn noise(a: u32, b: u32) -> f64 {
 }
 
 #[test]
-fn smooth_rough_and_wide_walls_are_wall_in_tunnels_of_any_size() {
+fn smooth_rough_and_wide_walls_are_accepted_in_tunnels_of_any_size() {
     for radius_m in [0.3, 1.0, 6.0] {
         Turning::new(radius_m, 1).all_wall(10, |_, _| radius_m);
         Turning::new(radius_m, 1).all_wall(10, |_, _| 1.06 * radius_m);
-        // Overbreak of a quarter of the radius, three lobes around and one along.
+        // The wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one along it.
         Turning::new(radius_m, 2)
             .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
-        // A vehicle beside its estimated place in the centre measures this.
+        // A vehicle beside its estimated place in the centre measures these ranges.
         Turning::new(radius_m, 1).all_wall(10, |_, angle| radius_m * (1.0 + 0.15 * math::sin(angle)));
     }
 }
 
 #[test]
-fn boulders_and_niches_are_wall_to_their_edges() {
+fn boulders_and_niches_are_wall_including_their_edges() {
     for (inward_m, half_width) in [(1.5, 0.1), (-2.0, 0.15), (3.0, 0.3)] {
-        // Objects are at least three steps wide. Their edges are one return each, on both sides.
+        // Objects are at least three steps wide. Each edge is a single return.
         Turning::new(6.0, 1).all_wall(8, |x_m, angle| {
             let within = (0.5..2.0).contains(&x_m) && (angle - 3.0).abs() < half_width;
             if within { 6.0 - inward_m } else { 6.0 }
@@ -108,10 +108,11 @@ fn boulders_and_niches_are_wall_to_their_edges() {
     }
 }
 
-/// Five successive returns that agree, far from the wall, once: a cloud of bubbles. A pole at the same place
-/// is met again.
+/// A cloud of bubbles gives five successive returns far from the wall that agree, in one turn only.
+///
+/// A pole at the same place is met again in later turns.
 #[test]
-fn floating_object_is_doubtful_and_pole_met_again_is_wall() {
+fn object_seen_in_one_turn_is_doubtful_and_object_seen_again_is_wall() {
     let near = |angle: f64| (angle - 3.0).abs() < 2.6 * TAU / f64::from(STEPS);
     for radius_m in [1.0, 6.0] {
         let cloud = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
@@ -124,7 +125,7 @@ fn floating_object_is_doubtful_and_pole_met_again_is_wall() {
         };
         let count = &Turning::new(radius_m, 1).turn(6, pole)[0];
         assert_eq!((count.wall, count.doubtful), (6 * STEPS as usize - 5, 5), "{radius_m}");
-        // An echo off two walls, three times in a row.
+        // An echo off two walls occurs three times in succession.
         let echo = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
             Some(if turn == 2 && (angle - 3.0).abs() < 1.6 * TAU / f64::from(STEPS) {
                 1.9 * radius_m
@@ -137,7 +138,7 @@ fn floating_object_is_doubtful_and_pole_met_again_is_wall() {
     }
 }
 
-/// A heap that is higher than wide, with a foot that slopes to the wall.
+/// A heap is higher than it is wide, and its foot slopes to the wall.
 #[test]
 fn run_ending_in_a_slope_to_the_wall_is_wall() {
     let steep = |_: f64, angle: f64| {
@@ -148,7 +149,7 @@ fn run_ending_in_a_slope_to_the_wall_is_wall() {
 }
 
 #[test]
-fn single_hit_is_doubtful_until_the_next_pass_confirms_it() {
+fn isolated_return_is_doubtful_until_the_next_pass_confirms_it() {
     let mut turning = Turning::new(6.0, 1);
     let fish = |_: usize, _: f64, _: f64, at: [u32; 2]| Some(if at == [2, 70] { 3.0 } else { 6.0 });
     let count = &turning.turn(5, fish)[0];
@@ -166,13 +167,13 @@ fn single_hit_is_doubtful_until_the_next_pass_confirms_it() {
 }
 
 #[test]
-fn stray_echoes_are_doubtful_and_the_head_stays_trusted() {
+fn stray_echoes_are_doubtful_but_the_head_remains_trusted() {
     for radius_m in [1.0, 6.0] {
         let mut turning = Turning::new(radius_m, 2);
         let murk = |head: usize, _: f64, _: f64, [turn, step]: [u32; 2]| {
             let place = [turn + 1000 * u32::try_from(head).unwrap(), step];
             let share = noise(place[0] + 7, place[1]);
-            // 5 % of the returns fall anywhere before the wall, 3 % are echoes off two walls.
+            // 5 % of the returns come from random places in front of the wall, and 3 % are echoes off two walls.
             Some(match share {
                 ..-0.9 => radius_m * (0.4 + 0.4 * noise(place[0], place[1] + 500)),
                 0.94.. => 2.0 * radius_m * (1.0 + 0.2 * noise(place[0], place[1] + 900)),
@@ -205,7 +206,7 @@ fn random_ranges_make_a_head_distrusted() {
 }
 
 #[test]
-fn outvoted_head_is_distrusted_until_it_agrees() {
+fn outvoted_head_is_distrusted_until_it_agrees_with_the_others() {
     for wrong in 0..3 {
         let mut turning = Turning::new(1.0, 3);
         let frozen = |head: usize, _: f64, _: f64, _: [u32; 2]| Some(if head == wrong { 0.55 } else { 1.0 });
@@ -221,7 +222,7 @@ fn outvoted_head_is_distrusted_until_it_agrees() {
         }
         let counts = turning.turn(6, frozen);
         assert_eq!((counts[wrong].wall, counts[wrong].doubtful), (0, 6 * STEPS as usize));
-        // The chainage begins again, as if the vehicle had gone back.
+        // The chainage begins at zero again, as if the vehicle had gone back.
         turning.turn(4, |_, _, _, _| Some(1.0));
         let counts = turning.turn(4, |_, _, _, _| Some(1.0));
         assert_eq!(counts[wrong].doubtful, 0, "the head is trusted again");
@@ -234,14 +235,14 @@ fn cave_seen_by_all_heads_is_wall() {
 }
 
 #[test]
-fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_it() {
+fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_the_centre() {
     for (out_m, named) in [(0.0, 0), (0.02, 0), (0.2, 1)] {
         let mut turning = Turning::new(1.0, 1);
         let limits = turning.limits;
         let mut names = 0;
         for step in 0..5 * STEPS {
             let angle = TAU * f64::from(step % STEPS) / f64::from(STEPS);
-            // From `out_m` left of the centre, a constant range of 0.95 m makes a circle about the head.
+            // With the head `out_m` left of the centre, a constant range of 0.95 m makes a circle about the head.
             let (sine, cosine) = math::sin_cos(angle);
             let (y, z) = (out_m + 0.95 * sine, -0.95 * cosine);
             let design_m = -out_m * sine + math::sqrt(1.0 - out_m * out_m * cosine * cosine);
@@ -259,7 +260,7 @@ fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_it() {
     }
 }
 
-/// Out of the centre, a constant range agrees with the wall for a while in each turn.
+/// Off the centre, a constant range agrees with the wall for a part of each turn.
 #[test]
 fn stuck_head_is_distrusted_until_its_range_moves() {
     for (radius_m, out_m) in [(1.0, 0.3), (6.0, 1.0)] {
@@ -272,7 +273,7 @@ fn stuck_head_is_distrusted_until_its_range_moves() {
             let (sine, cosine) = math::sin_cos(angle);
             let design_m = -out_m * sine + math::sqrt(radius_m * radius_m - out_m * out_m * cosine * cosine);
             let sticks = (2 * STEPS..2 * STEPS + STEPS / 2).contains(&step);
-            // The range is right when the head gets stuck.
+            // The range is correct at the moment when the head gets stuck.
             let range_m = if sticks { *stuck_m.get_or_insert(design_m) } else { design_m };
             let (y, z) = (out_m + range_m * sine, -range_m * cosine);
             let placed = PlacedReturn {
@@ -290,7 +291,7 @@ fn stuck_head_is_distrusted_until_its_range_moves() {
             }
         }
         let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
-        // All wall samples since the head got stuck are withdrawn, and none from before.
+        // All wall samples since the head got stuck are withdrawn, and no earlier samples.
         let begun_m = 0.001 * f64::from(2 * STEPS);
         assert!((from_m - begun_m).abs() <= 0.001 + 1e-9, "{from_m}");
         assert!(

@@ -7,7 +7,9 @@ use crate::math::{self, PI, TAU};
 const CERAN_BASE_M: f64 = 10.4;
 /// Radius of the Ceran tunnel's trimmed circle, m (the paper's §7.3).
 const CERAN_RADIUS_M: f64 = 6.05;
-/// Perimeter on the plant's blueprint, m (the paper's §9.2); the dimensions above give 35.90 m instead.
+/// Perimeter on the plant's blueprint, m (the paper's §9.2).
+///
+/// The base and radius above give 35.90 m instead.
 const CERAN_BLUEPRINT_PERIMETER_M: f64 = 34.17;
 
 /// A rectangle, with its reference point at the centre.
@@ -27,7 +29,7 @@ pub fn circle(radius_m: f64) -> Result<Profile, ProfileError> {
     Profile::new([0.0, 0.0], &[Piece::Arc { centre, sweep_rad: TAU }], centre)
 }
 
-/// The paper's Fig. 2: vertical walls under an arc of radius `arch_radius_m` >= width / 2.
+/// Vertical walls under an arc of radius `arch_radius_m` >= width / 2, as in the paper's Fig. 2.
 ///
 /// `height_m` is the height of the crown. The reference point is at half height.
 ///
@@ -60,16 +62,16 @@ pub fn trimmed_circle(radius_m: f64, base_m: f64) -> Result<Profile, ProfileErro
     Profile::new([0.0, 0.0], &pieces, centre)
 }
 
-/// The tunnel of the paper with its stated dimensions: perimeter 35.90 m.
+/// The paper's tunnel with the dimensions that the paper states: perimeter 35.90 m.
 ///
-/// Errors: none that can occur.
+/// Errors: none; the dimensions are valid.
 pub fn ceran() -> Result<Profile, ProfileError> {
     trimmed_circle(CERAN_RADIUS_M, CERAN_BASE_M)
 }
 
 /// The shape of [`ceran`], scaled to the perimeter of the blueprint, 34.17 m.
 ///
-/// Errors: none that can occur.
+/// Errors: none; the dimensions are valid.
 pub fn ceran_blueprint() -> Result<Profile, ProfileError> {
     let scale = CERAN_BLUEPRINT_PERIMETER_M / ceran()?.perimeter_m();
     trimmed_circle(CERAN_RADIUS_M * scale, CERAN_BASE_M * scale)

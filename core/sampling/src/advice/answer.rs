@@ -13,10 +13,10 @@ const MODE_NAME_BYTES: usize = 15;
 pub enum Reason {
     /// The distance between passes is the limit: a lower speed helps.
     HelixPitch,
-    /// A lower speed does not help. Another mode or position, or a steadier vehicle would.
+    /// A lower speed does not help, but another mode or position, or a steadier vehicle would.
     ///
-    /// The distance between neighbours of one turn, a strip that no head sees, or the swing of the beams reaches the
-    /// target.
+    /// The target is reached by the distance between neighbours of one turn, a strip that no head sees, or the beams'
+    /// swing.
     AngularStep,
     /// No advice is possible without position and heading.
     NoHeadingOrFix,
@@ -57,7 +57,7 @@ pub struct ModeName {
 }
 
 impl ModeName {
-    /// Creates it from a name, truncated to 15 bytes.
+    /// Creates a mode name, truncated to 15 bytes.
     pub fn new(name: &str) -> Self {
         let mut bytes = [0; MODE_NAME_BYTES];
         let len = name.floor_char_boundary(MODE_NAME_BYTES);
@@ -82,14 +82,14 @@ impl core::fmt::Debug for ModeName {
 pub enum Remedy {
     /// Another mode.
     Mode(ModeName),
-    /// The middle of the tunnel, level and straight.
+    /// Moving to the middle of the tunnel, level and straight.
     Centre,
-    /// A steady heading.
+    /// Holding a steady heading.
     HoldHeading,
 }
 
 impl Remedy {
-    /// Its number in published data; 0 means no remedy.
+    /// Number of the remedy in published data; 0 means no remedy.
     pub fn number(self) -> u64 {
         match self {
             Self::HoldHeading => 1,
@@ -98,7 +98,9 @@ impl Remedy {
         }
     }
 
-    /// Returns the remedy with that number; `mode` is the name for [`Remedy::Mode`]. `None` for any other number.
+    /// Returns the remedy with that number; `None` for any other number.
+    ///
+    /// `mode` is the name for [`Remedy::Mode`].
     pub fn of(number: u64, mode: &str) -> Option<Self> {
         let all = [Self::HoldHeading, Self::Centre, Self::Mode(ModeName::new(mode))];
         all.into_iter().find(|remedy| remedy.number() == number)
@@ -114,42 +116,42 @@ impl Remedy {
     }
 }
 
-/// Result of all heads in one of their modes.
+/// Largest speed with all heads in one of their modes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// The mode.
     pub mode: ModeName,
-    /// The largest speed at which the target is met with the heads started in phase, m/s.
+    /// The largest speed that meets the target with the heads started in phase, m/s.
     ///
-    /// Zero if there is none.
+    /// Zero if no speed does.
     pub v_max_mps: f64,
 }
 
-/// A restart of the heads in their present mode, in phase for a speed.
+/// A restart of the heads in their present mode, with their phases set for a speed.
 ///
-/// It corresponds to `planned_speed_mps` in `[heads]` of the vehicle file.
+/// The speed corresponds to `planned_speed_mps` in `[heads]` of the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Anew {
-    /// Speed to start them for, m/s: the largest that then meets the target.
+    /// Speed for which to start the heads, m/s: the largest speed that meets the target after the restart.
     pub planned_speed_mps: f64,
 }
 
 /// Remaining length and time of a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Left {
-    /// Length of tunnel in the direction of travel, m.
+    /// Remaining length of tunnel in the direction of travel, m.
     pub length_m: f64,
-    /// Time, seconds, if known.
+    /// Remaining time, seconds, if known.
     pub time_s: Option<f64>,
 }
 
 impl Left {
-    /// Returns the hours needed for the length at a speed; `None` at zero speed.
+    /// Returns the hours needed for the remaining length at a speed; `None` at zero speed.
     pub fn hours_at(&self, speed_mps: f64) -> Option<f64> {
         (speed_mps > 0.0).then(|| self.length_m / speed_mps / 3600.0)
     }
 
-    /// Whether the time is enough at a speed; `None` if the time is unknown.
+    /// Whether the remaining time is enough at a speed; `None` if the time is unknown.
     pub fn suffices_at(&self, speed_mps: f64) -> Option<bool> {
         let time_s = self.time_s?;
         Some(self.hours_at(speed_mps).is_some_and(|hours| hours * 3600.0 <= time_s))
@@ -161,29 +163,29 @@ impl Left {
 pub struct Advice {
     /// The largest speed at which sections will pass, m/s; zero if there is none.
     pub v_max_mps: f64,
-    /// Lower end of the interval of speeds that meet the target, m/s; zero if all lower speeds meet it.
+    /// Lower end of the advised interval of speeds, m/s; zero if all lower speeds meet the target.
     ///
-    /// Below it, heads apart along the hull run out of phase.
+    /// At lower speeds, heads apart along the hull run out of phase.
     pub from_mps: f64,
     /// Speed nearest to the present one that meets the target, m/s.
     ///
-    /// `None` if the present one does, or none is near.
+    /// `None` if the present speed meets the target, or if no speed near it does.
     pub nearest_mps: Option<f64>,
     /// The limiting factor.
     pub reason: Reason,
-    /// T_max predicted at the present speed, m; `None` if it is unpredictable or unbounded.
+    /// T_max predicted at the present speed, m; `None` if it cannot be predicted or is unbounded.
     pub predicted_t_m: Option<f64>,
-    /// Whether the present turn will exceed the target at the present speed; false without a prediction.
+    /// Whether T of the present turn is forecast to exceed the target; false without a prediction.
     pub will_exceed: bool,
-    /// Whether the present turn may exceed the target at the present speed; false without a prediction.
+    /// Whether T of the present turn may exceed the target; false without a prediction.
     ///
-    /// T is then within the position margin of the target.
+    /// The predicted T then exceeds the target less the margin for position errors.
     pub may_exceed: bool,
     /// Target less the margin for position errors, m.
     pub sure_m: f64,
     /// The longest time between two passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
-    /// The same time if the heads' passes were evenly spread, s.
+    /// The longest time between two passes if the heads' passes were evenly spread, seconds.
     pub even_pass_gap_s: f64,
     /// The largest distance between neighbours of one turn, m.
     pub t_y_m: f64,
@@ -197,13 +199,13 @@ pub struct Advice {
     pub left: Left,
     /// Width of a strip that no head sees, and the arc length of its middle, m.
     ///
-    /// `Some` only if a lower speed does not help because of it.
+    /// `Some` only if this strip is the reason why a lower speed does not help.
     pub unseen_m: Option<[f64; 2]>,
     /// Remedy if a lower speed does not help.
     pub remedy: Option<Remedy>,
     /// Alternatives in the modes that all heads have.
     pub alternatives: [Option<Alternative>; MAX_MODES],
-    /// Effect of restarting the heads; `None` if their phases do not depend on the speed.
+    /// Restart of the heads for their best speed; `None` if their phases do not depend on the speed.
     pub anew: Option<Anew>,
     /// Cost of each margin, updated every five seconds.
     pub margins: Option<Margins>,

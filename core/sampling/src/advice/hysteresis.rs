@@ -5,32 +5,35 @@ use super::search::SPEED_MARGIN;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Less restrictive advice is displayed after no more restrictive one has come for this long.
+/// Less restrictive advice is displayed after this time without more restrictive advice.
 const HOLD: DurNs = DurNs(1_000_000_000);
 /// Time for which a higher speed must last before it is displayed.
 ///
-/// It must be higher by the share below: 3 mm/s at 0.1 m/s.
+/// The speed must exceed the displayed one by [`RISES_BY`]: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
 /// A lower speed is displayed at once if it is lower by this share.
 ///
 /// Smaller differences are within half of the speed margin.
 const FALLS_BY: f64 = SPEED_MARGIN / 2.0;
-/// Number of stored advice updates: those within `HOLD` at 5 Hz.
+/// Number of stored advice updates: all updates within `HOLD` at 5 Hz.
 const HELD: usize = 6;
-/// Share by which the predicted T must exceed the target for a forecast of too large T.
+/// Share by which the predicted T must exceed the target before the display forecasts an exceedance.
 ///
-/// It is half of the speed margin, so that the forecast does not flicker at the advised speed.
+/// The share is half of the speed margin, so that the forecast does not flicker at the advised speed.
 const BEYOND: f64 = SPEED_MARGIN / 2.0;
-/// The same for the target less position errors; a pilot may exceed the advised speed by 1 or 2 %.
+/// Share by which the predicted T must exceed the remaining target before a possible exceedance is displayed.
+///
+/// The remaining target is the target less the margin for position errors. A pilot may exceed the advised speed by 1
+/// or 2 %.
 const MAYBE_BEYOND: f64 = 0.03;
 
 /// Displays the most restrictive advice of the last second.
 ///
-/// That is the most severe reason and, within it, the lowest speed. A more severe reason appears at once, a less
-/// severe one after it has lasted a second. A speed that is lower by 0.5 % appears at once. A speed that is higher by
-/// 3 % appears after ten seconds, as the lowest of that time. Smaller changes do not appear. Advice is unfiltered
-/// until the first speed, or the first reason against any speed.
+/// The most restrictive advice has the most severe reason and, for equal reasons, the lowest speed. A more severe
+/// reason appears at once; a less severe one appears after a second. A speed that is lower by 0.5 % appears at once.
+/// If all speeds are higher by 3 % for ten seconds, the lowest of them appears. Smaller changes do not appear. Advice
+/// is unfiltered until the first speed, or the first reason against any speed.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
     target_m: f64,
@@ -41,7 +44,7 @@ pub struct Hysteresis {
     may_exceed: bool,
     /// Displayed speed, m/s, and the time of the latest advice.
     shown: Option<(MonoNs, f64)>,
-    /// Time since which all speeds have been higher than the displayed one, and the lowest of them, m/s.
+    /// Time since which all speeds exceed the displayed one, and the lowest of these speeds, m/s.
     rising: Option<(MonoNs, f64)>,
 }
 
@@ -97,7 +100,7 @@ impl Hysteresis {
         shown
     }
 
-    /// Returns the speed to display, m/s, for the lowest of the last second.
+    /// Returns the speed to display, m/s; `speed_mps` is the lowest speed of the last second.
     fn steadied_mps(&mut self, at: MonoNs, speed_mps: f64, is_speed: bool) -> f64 {
         let before = self.shown.filter(|(then, _)| at.since(*then).0.abs() <= HOLD.0);
         let Some((_, before_mps)) = before.filter(|_| is_speed) else {
@@ -123,7 +126,9 @@ impl Hysteresis {
     }
 }
 
-/// Whether the predicted T exceeds a limit; without a prediction, the advice's own forecast.
+/// Whether the predicted T exceeds a limit.
+///
+/// Without a prediction, the result is the forecast of the advice itself.
 fn exceeds(advice: &Advice, limit_m: f64) -> bool {
     advice.predicted_t_m.map_or(advice.will_exceed, |t_m| t_m > limit_m)
 }
@@ -164,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn reset_removes_earlier_advice() {
+    fn higher_speed_appears_at_once_after_a_reset() {
         let mut steady = Hysteresis::new(TARGET_M);
         let show = |steady: &mut Hysteresis, k: u64, mps: f64| {
             steady.show(MonoNs(3_000_000_000 + k * 200_000_000), speed(mps)).v_max_mps
@@ -178,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn severe_reason_appears_at_once_and_lesser_one_after_1_s() {
+    fn more_severe_reason_appears_at_once_and_less_severe_one_after_1_s() {
         let ladder = [Reason::HelixPitch, Reason::AngularStep, Reason::NoReturns, Reason::NoHeadingOrFix];
         for pair in ladder.windows(2) {
             let [lesser, graver] = [0, 1].map(|k| Advice::nothing(pair[k]));
@@ -203,7 +208,7 @@ mod tests {
         let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
         let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
-        // The lowest of a second, and ten seconds of higher speeds.
+        // The low speed counts for a second, and the higher one must then last for ten seconds.
         assert_eq!(speeds[10..66], [0.1; 56]);
         assert_eq!(speeds[66..], [0.2; 15]);
     }
@@ -260,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_resets_the_hysteresis() {
+    fn gap_of_more_than_1_s_resets_the_hysteresis() {
         let mut steady = Hysteresis::new(TARGET_M);
         steady.show(MonoNs(0), speed(0.1));
         assert!((steady.show(MonoNs(1_200_000_000), speed(0.2)).v_max_mps - 0.2).abs() < 1e-12);

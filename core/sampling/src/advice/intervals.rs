@@ -1,10 +1,10 @@
 //! Intervals of speed that meet a target.
 //!
-//! They arise because heads apart along the hull are in phase only at some speeds.
+//! Heads apart along the hull are in phase only at some speeds, so several intervals may meet a target.
 //!
 //! The advised speed depends on the measured heads and the vehicle's pose, not on the present speed. It is the upper
-//! end of the highest interval. If that interval vanishes while heads run out of phase, the next one may be far
-//! below, and the advice jumps. In both directions [`EASE`] provides hysteresis.
+//! end of the highest interval. If that interval vanishes while heads run out of phase, the next interval may be far
+//! lower, and the advice jumps. [`EASE`] provides hysteresis in both directions.
 
 use super::search::{self, SPEED_MARGIN};
 use crate::margin::RemainingTarget;
@@ -15,12 +15,12 @@ use headrace_geometry::math;
 
 /// Hysteresis as a share of the target.
 ///
-/// A followed interval may miss the target by this share, and a higher one must meet it by as much; 2 mm/s at 0.1
-/// m/s.
+/// The advised interval may miss the target by this share. A higher interval must meet the target reduced by this
+/// share. Two percent correspond to 2 mm/s at 0.1 m/s.
 pub(super) const EASE: f64 = 0.02;
 /// Speeds closer together than this share belong to one interval.
 const NEAR: f64 = 0.05;
-/// Number of speeds tried on either side, and the relative step between them.
+/// Number of speeds tested on either side of the previous result, and the relative step between them.
 const TRIED: i32 = 30;
 const TRIED_SHARE: f64 = 0.001;
 
@@ -30,11 +30,11 @@ pub(super) struct Driving<'a> {
     pub(super) phasing: &'a Phasing,
     pub(super) going: &'a Going,
     pub(super) parallax_rad: f64,
-    /// Whether lost returns count.
+    /// Whether lost returns require extra passes.
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: RemainingTarget,
-    /// Largest remaining target, and the heads' distance along the hull, m.
+    /// Remaining target at unlimited speed, and the heads' distance along the hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
     /// Speed above which no phase meets the target, m/s.
@@ -47,11 +47,13 @@ impl Driving<'_> {
         self.tries(speed_mps, more).is_ok()
     }
 
-    /// The same. The error is a speed at most as high; no speed between both meets the target.
+    /// Checks whether a speed meets the target, enlarged by the share `more`.
+    ///
+    /// The error is a lower or equal speed, m/s; no speed between the two meets the target.
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);
-        // No strip has more passes than all heads make together: this test alone rules out most speeds.
+        // No strip has more passes than all heads together, so this test alone rejects most speeds.
         let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
         if speed_mps * gap_s > most_m {
             return Err(self.below_mps(speed_mps, gap_s, most_m));
@@ -61,7 +63,7 @@ impl Driving<'_> {
             return Err(speed_mps);
         }
         let Some(unmet) = self.strips.unmet(0, &then, speed_mps, target_m, self.going) else { return Ok(()) };
-        // The wall on either side may meet the target across a narrower strip.
+        // Across a narrower strip, the samples on either side may meet the target.
         let stays = unmet.width_m > most_m;
         let below_mps = |along_m| self.below_mps(speed_mps, unmet.gap_s, along_m).min(speed_mps);
         Err(if stays { spacing::along_m(most_m, unmet.t_y_m).map_or(0.0, below_mps) } else { speed_mps })
@@ -69,9 +71,9 @@ impl Driving<'_> {
 
     /// Returns the speed, m/s, down to which passes stay more than `most_m` apart.
     ///
-    /// At the given speed they are `gap_s` apart in time. At u < v, heads at most a apart along the hull shift by up
-    /// to a (1 / u - 1 / v) in time against each other. Their longest gap is at least g less that shift, so its
-    /// length is at least u g - a (1 - u / v).
+    /// At the given speed v, passes are g = `gap_s` apart in time. At a lower speed u, heads at most a apart along
+    /// the hull shift by up to a (1 / u - 1 / v) in time relative to each other. The longest gap is then at least g
+    /// less that shift, so its length is at least u g - a (1 - u / v).
     fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
         /// Allowance for rounding.
         const A_LITTLE: f64 = 1e-9;
@@ -110,9 +112,9 @@ impl Driving<'_> {
         top_mps
     }
 
-    /// Returns the speed after the margin [`SPEED_MARGIN`], or up to twice that margin.
+    /// Returns the speed reduced by the margin [`SPEED_MARGIN`], or by up to twice that margin.
     ///
-    /// The larger margin applies where T grows faster than the speed. T does so where heads run out of phase: a speed
+    /// The larger margin applies where T grows faster than the speed, because the heads run out of phase. A speed
     /// error of 1 % then costs more than 1 % of T.
     pub(super) fn kept_back_mps(&self, fastest_mps: f64) -> f64 {
         const STEEP: f64 = 2.0 * SPEED_MARGIN;
@@ -127,7 +129,7 @@ impl Driving<'_> {
         less_mps.min(search::kept_back_mps(fastest_mps, 1.0 - edge_mps / fastest_mps / (1.0 + STEEP), meets))
     }
 
-    /// Best speed near the previous result, if that misses the target by little.
+    /// Returns the best speed near the previous result; `None` if T there exceeds the target by over [`EASE`].
     fn kept_mps(&self, last_mps: f64) -> Option<f64> {
         let near = (-TRIED..=TRIED).map(|k| last_mps * (1.0 + TRIED_SHARE * f64::from(k)));
         let best =
@@ -137,10 +139,10 @@ impl Driving<'_> {
 
     /// Returns the lower end of the interval below a speed that meets the target, m/s.
     ///
-    /// Zero if all lower speeds meet it.
+    /// Zero if all lower speeds meet the target.
     pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
         const STEP: f64 = 0.99;
-        /// Share of the speed below which the search stops, since no pilot would go that slowly.
+        /// Share of the speed at which the search stops, since no pilot would go that slowly.
         const SLOWEST: f64 = 0.2;
         if !self.phasing.fits_some_speeds() {
             return 0.0;
@@ -158,7 +160,7 @@ impl Driving<'_> {
 
     /// Returns the speed nearest to `speed_mps` that meets the target, m/s, within a factor of two.
     ///
-    /// `None` if `speed_mps` meets it, or no speed does.
+    /// `None` if `speed_mps` itself meets the target, or no speed within that factor does.
     pub(super) fn nearest_mps(&self, speed_mps: f64) -> Option<f64> {
         const STEPS: i32 = 70;
         const STEP: f64 = 0.01;

@@ -9,31 +9,31 @@ use headrace_geometry::frames::Pose;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
 
-/// Relative speed change that is tolerated before rings are recast.
+/// Relative change of the advised speed that is tolerated before rings are recast.
 const SHARE: f64 = 0.002;
 /// Limits of the movement across the tunnel before a recast, m.
 ///
-/// The lower limit is needed because the target may leave next to nothing; the upper one because hidden strips move
+/// The lower limit applies where steps nearly reach the target. The upper limit applies because hidden strips move
 /// with the vehicle.
 const STILL_M: [f64; 2] = [0.004, 0.1];
-/// Tolerated rotation per metre of that movement, as a quaternion component (half an angle, rad).
+/// Tolerated rotation per metre of tolerated movement, as a quaternion component (half an angle, rad).
 const TURN_PER_M: f64 = 0.2;
 
 /// Resolution and update rate of the advice's view of the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
-    /// Number of rays in a head's ring, evenly over a turn; at least one.
+    /// Number of rays in a head's ring, spread evenly over a turn; at least one.
     ///
     /// Steps of heads are rounded up to whole multiples of the angle between rays.
     pub ring: u32,
     /// Movement across the tunnel before a ring is recast, m.
     ///
-    /// `None` means a movement that changes the speed by 0.2 %, within 4 mm to 0.1 m.
+    /// `None` means a movement that changes the advised speed by 0.2 %, limited to 4 mm to 0.1 m.
     pub anew_m: Option<f64>,
 }
 
 impl Default for Looks {
-    /// The finest step of the supported heads, 0.3 degrees.
+    /// One ray per 0.3 degrees, the finest step of the supported heads.
     fn default() -> Self {
         Self { ring: 1200, anew_m: None }
     }
@@ -41,9 +41,9 @@ impl Default for Looks {
 
 /// Returns the movement across the tunnel before rings are recast, m.
 ///
-/// Steps of `t_y_m` on a wall `range_m` away bound the speed v for a target T; `swing_share` is w / v for a beam
+/// Steps of `t_y_m` on a wall `range_m` away bound the speed v for a target T. `swing_share` is w / v for a beam
 /// swing w. A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y / T_y. A step
-/// changes with its range, twice as much where the wall falls away.
+/// changes in proportion to its range, and by twice as much where the wall falls away.
 pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64) -> f64 {
     let around2 = t_y_m * t_y_m;
     let along2 = (target_m * target_m - around2).max(0.0);
@@ -67,7 +67,7 @@ stateful!(AdvisedHead { state: ring, cast_at; fixed: spec, modes, hidden, sector
 impl AdvisedHead {
     /// Whether the vehicle is close to the pose at which the ring was cast.
     ///
-    /// Limits: `still_m`, and [`TURN_PER_M`] times that.
+    /// The limit of the movement is `still_m`; the limit of the rotation is [`TURN_PER_M`] times `still_m`.
     pub(super) fn is_near(&self, pose: &Pose, still_m: f64) -> bool {
         let Some(cast_at) = &self.cast_at else { return false };
         let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
@@ -76,7 +76,9 @@ impl AdvisedHead {
             && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), still_m * TURN_PER_M)
     }
 
-    /// Recasts the head's ring. After an error `cast_at` is `None`, and the caller keeps the last view.
+    /// Recasts the head's ring.
+    ///
+    /// After an error `cast_at` is `None`, and the caller keeps the last view.
     pub(super) fn cast(&mut self, profile: &Profile, pose: &Pose, ring: u32) -> Result<(), SamplingError> {
         self.cast_at = None;
         let standing = Standing::new(profile, pose, &self.spec.mount)?;
@@ -85,7 +87,7 @@ impl AdvisedHead {
         Ok(())
     }
 
-    /// Updates the view: wall within its sector, hidden wall, and wall out of reach.
+    /// Updates the view: the wall within the head's sector, the hidden wall, and the wall out of reach.
     pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
         let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };

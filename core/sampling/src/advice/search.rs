@@ -1,11 +1,11 @@
 //! Search for speeds that meet a target, which may form several intervals.
 
-/// Share of the speed held back for errors of its measurement.
+/// Share by which the advised speed is reduced to allow for errors of the measured speed.
 pub const SPEED_MARGIN: f64 = 0.01;
 
 /// Returns the largest speed up to `bound_mps` that meets the target, if all slower ones do.
 ///
-/// Zero if there is none.
+/// Zero if no speed meets the target.
 pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     const LEAST_SHARE: f64 = 1e-3;
     if meets(bound_mps) {
@@ -17,8 +17,8 @@ pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
 
 /// Finds the largest speed up to `bound_mps` that meets the target, by stepping down.
 ///
-/// Zero if there is none. `tries` returns, for a speed that misses the target, the speed below which it may be met
-/// again.
+/// Zero if no speed meets the target. For a speed that misses the target, `tries` returns a speed at or below it; no
+/// speed between the two meets the target.
 pub(super) fn downwards_mps(bound_mps: f64, tries: impl Fn(f64) -> Result<(), f64>) -> f64 {
     const TRIED: u32 = 256;
     let at = |k: u32| bound_mps * (1.0 - f64::from(k) / f64::from(TRIED));
@@ -41,7 +41,7 @@ pub(super) fn downwards_mps(bound_mps: f64, tries: impl Fn(f64) -> Result<(), f6
 
 /// Returns `fastest_mps`, which meets the target, reduced by `share`.
 ///
-/// If that leaves the interval of speeds that meet the target, it returns the middle of the interval.
+/// If the reduced speed misses the target, the result is the middle of the interval that ends at `fastest_mps`.
 pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) -> bool) -> f64 {
     let less_mps = fastest_mps * (1.0 - share);
     if fastest_mps <= 0.0 || meets(less_mps) {
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn margin_does_not_leave_the_interval() {
+    fn speed_reduced_by_the_margin_stays_within_the_interval() {
         let wide = |mps: f64| (0.1..=0.2).contains(&mps);
         assert!((kept_back_mps(0.2, 0.01, wide) - 0.198).abs() < 1e-12);
         let narrow = |mps: f64| (0.199..=0.2).contains(&mps);
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn highest_interval_is_found() {
+    fn search_finds_the_highest_interval() {
         let islands = |mps: f64| (0.05..=0.1).contains(&mps) || (0.13..=0.15).contains(&mps);
         assert!((highest_mps(0.3, |mps| mps < 0.1) - 0.1).abs() < 1e-9);
         assert!((highest_mps(0.3, |_| true) - 0.3).abs() <= 0.0 && highest_mps(0.3, |_| false) <= 0.0);

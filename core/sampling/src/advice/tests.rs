@@ -31,7 +31,7 @@ struct Case {
 }
 
 impl Case {
-    /// Heads at x along the hull with these angles, all in FAST, in the centre of `ceran`.
+    /// Heads at the positions `x_m` along the hull with these angles, all in FAST, in the centre of `ceran`.
     fn new(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, target_m: f64) -> Self {
         let profile = shapes::ceran().unwrap();
         let specs: Vec<HeadSpec> = x_m.iter().map(|x| spec([*x, 0.0, 0.0], 0.0)).collect();
@@ -98,27 +98,27 @@ fn largest_speed_just_meets_the_target() {
 }
 
 #[test]
-fn largest_speed_keeps_heads_apart_in_phase() {
+fn largest_speed_accounts_for_the_phases_of_heads_along_the_hull() {
     let case = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0);
     let advice = case.advice();
     let t_at = |speed_mps: f64| case.t_at_m(&advice, speed_mps);
     let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
     assert!((t_at(v_max) - 1.0).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
     assert!(t_at(1.02 * v_max) > 1.0);
-    // Evenly phased at every speed, they could move faster.
+    // With even phases at every speed, the vehicle could move faster.
     let even = spacing::speed_for_target_mps(1.0, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
     assert!(v_max < 0.99 * even, "{v_max} and {even}");
     let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
     assert!(advice.phase_error_rad.unwrap().abs() < 1e-9 && faster.phase_error_rad.unwrap().abs() > 0.5);
-    // At too high a present speed, the advised speed still meets the target.
+    // If the present speed is too high, the advised speed still meets the target.
     let passes = Phasing::of(&case.situation).at(faster.v_max_mps);
     let t_m = |v: f64| spacing::t_max_m(v * passes.gap_s(passes.heads()).unwrap(), v * 0.02, faster.t_y_m);
     assert!(faster.v_max_mps > 0.1 && t_m(faster.v_max_mps) <= 1.0);
 }
 
 #[test]
-fn speed_that_meets_the_target_is_not_too_fast() {
-    // Heads 1.1 m apart meet 0.5 m only in narrow intervals of speed; the present speed is in one of them.
+fn advised_speed_is_not_below_a_present_speed_that_meets_the_target() {
+    // Heads 1.1 m apart meet 0.5 m only in narrow intervals of speed. The present speed is in such an interval.
     let phase_deg = |v: f64| 180.0 - 360.0 * 1.1 / (v * 8.0);
     for v in [0.06, 0.085, 0.1, 0.105] {
         let case = Case::new(&[0.0, phase_deg(v)], &[0.0, -1.1], v, 0.5);
@@ -152,7 +152,7 @@ fn wall_out_of_reach_is_unseen() {
 }
 
 #[test]
-fn stationary_vehicle_keeps_its_direction() {
+fn stationary_vehicle_keeps_its_last_direction_of_travel() {
     let case = Case::new(&[0.0, 180.0], &[0.0; 2], 0.2, 1.0);
     let mut advisor = case.advisor();
     let mut then = case.situation;
@@ -165,7 +165,7 @@ fn stationary_vehicle_keeps_its_direction() {
 }
 
 #[test]
-fn return_uses_its_own_phases_and_length() {
+fn backward_travel_has_its_own_phases_and_remaining_length() {
     let case = Case::new(&[30.0, 250.0], &[0.9, -0.3], -0.2, 1.0);
     let advice = case.advice();
     let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
@@ -178,7 +178,7 @@ fn return_uses_its_own_phases_and_length() {
 }
 
 #[test]
-fn alternatives_give_speed_hours_and_whether_they_suffice() {
+fn alternatives_give_speed_and_duration_and_check_the_time_left() {
     let mut case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     assert_eq!(case.advice().left.suffices_at(1.0), None);
     case.left_s = Some(3000.0);
@@ -195,7 +195,7 @@ fn alternatives_give_speed_hours_and_whether_they_suffice() {
     assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
 }
 
-/// Two heads in sectors of half a turn each: the longest wait of a place equals a whole turn.
+/// Two heads in sectors of half a turn each: a sweep there and back takes as long as a whole turn.
 #[test]
 fn sector_alternatives_use_the_sweep_time_of_their_mode() {
     let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
@@ -203,12 +203,12 @@ fn sector_alternatives_use_the_sweep_time_of_their_mode() {
     let advice = case.advice();
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap().v_max_mps);
     assert!((fast - advice.v_max_mps).abs() < 1e-9, "the present mode: {fast} {}", advice.v_max_mps);
-    // 21.6 s plus a ping, with negligible steps along the wall.
+    // The longest gap is 21.6 s plus a ping, and steps along the wall are negligible.
     assert!((slow / (0.8 / 21.618 * 0.99) - 1.0).abs() < 0.01, "{slow}");
 }
 
 #[test]
-fn remedy_is_given_if_slower_does_not_help() {
+fn remedy_is_advised_if_a_lower_speed_does_not_help() {
     let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.1);
     let advice = case.advice();
     assert_eq!((advice.v_max_mps, advice.reason), (0.0, Reason::AngularStep));
@@ -216,7 +216,7 @@ fn remedy_is_given_if_slower_does_not_help() {
     assert_eq!(advice.left.hours_at(advice.v_max_mps), None);
     assert!(advice.alternatives[0].unwrap().v_max_mps > 0.0);
 
-    // Near the corner of the floor this mode's steps are too long, but not in the centre.
+    // In this mode, steps are too long near the floor's corner, but not in the tunnel's centre.
     case = Case::new(&[0.0], &[0.0], 0.2, 0.25);
     assert_eq!(case.advice().reason, Reason::HelixPitch);
     case.situation.pose =
@@ -240,7 +240,7 @@ fn mutual_occlusion_lowers_the_speed() {
     let mut advisor = case.advisor();
     let hidden = advisor.advise(&case.situation, Swing::default(), None);
     assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
-    // Each head has one wall hidden by its neighbour, where half of the passes are missing.
+    // Each head has one wall hidden by its neighbour. On that wall, half of the passes are missing.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
     assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
     // Steps are short on the hidden strips.
@@ -270,7 +270,7 @@ fn outdated_rings_are_recast_one_per_call() {
 }
 
 #[test]
-fn moving_vehicle_recasts_rings_in_turn() {
+fn moving_vehicle_has_no_ring_older_than_3_updates() {
     let case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
     let mut advisor = case.advisor();
     let pose = case.situation.pose.unwrap();
@@ -282,13 +282,13 @@ fn moving_vehicle_recasts_rings_in_turn() {
     assert!(advisor.heads.iter().all(|head| (9..12).any(|step| head.is_near(&at(step), 1e-9))));
 }
 
-/// Heads side by side, each hiding some of the wall from the next.
+/// Heads side by side, each of which hides some of the wall from its neighbour.
 fn hiding_each_other() -> Case {
     let mut case = Case::new(&[0.0, 90.0, 180.0, 270.0], &[0.0; 4], 0.125, 0.5);
     let places = [[0.5, 0.15, 0.0], [0.5, -0.15, 0.0], [-0.5, 0.15, 0.0], [-0.5, -0.15, 0.0]];
     for ((spec, motion), place) in case.specs.iter_mut().zip(&mut case.situation.heads).zip(places) {
         *spec = self::spec(place, 0.04);
-        // Phased for 0.125 m/s, at which 1 m is the advance of a whole turn.
+        // The heads are phased for 0.125 m/s, at which the vehicle advances 1 m in a whole turn.
         if let Some(motion) = motion {
             motion.mount = spec.mount;
         }
@@ -296,10 +296,10 @@ fn hiding_each_other() -> Case {
     case
 }
 
-/// Largest relative speed error of an advisor that caches rings, compared with one that recasts each time.
+/// Largest relative speed error due to cached rings, compared with rings recast each time.
 ///
-/// The track moves to and fro and in circles at 1.5 cm/s and half a degree per second. Also returns the number of
-/// rings cast in 600 updates.
+/// The track moves to and fro and in circles at 1.5 cm/s and half a degree per second. The second result is the
+/// number of rings cast in 600 updates.
 fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
     let [y_m, z_m] = case.profile.reference();
     let mut advisor = case.advisor();
@@ -332,7 +332,7 @@ fn cached_rings_hardly_change_the_advice() {
         ("hiding each other", hiding_each_other(), still, 0.002, 0..100),
         ("a wide target", Case::new(&[0.0], &[0.0], 0.1, 1.0), still, 0.002, 0..30),
         ("swinging", around(), swing, 0.006, 0..250),
-        // Steps are nearly as long as the target, so each centimetre matters and rings are recast more often.
+        // Steps are nearly as long as the target. Each centimetre matters, so rings are recast more often.
         ("a target hard to meet", Case::new(&[0.0, 180.0], &[0.0; 2], 0.1, 0.3), still, 0.02, 250..600),
     ] {
         let (off, cast) = off_by(&case, swing);
@@ -347,7 +347,7 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
     let still = advise(Swing::default());
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
     let swung = advise(swing);
-    // The speed is reduced by the beam sweep at their range.
+    // The speed is reduced by the speed of the beams along the wall at that range.
     let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
     assert!((0.05..0.07).contains(&lost_mps), "{lost_mps}");
     assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
@@ -362,7 +362,7 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
 }
 
 #[test]
-fn swing_acts_between_heads_apart() {
+fn swing_widens_gaps_between_heads_apart_along_the_hull() {
     let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
     let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
@@ -371,7 +371,8 @@ fn swing_acts_between_heads_apart() {
         assert!((advice.pass_gap_s - 4.0).abs() < 1e-9, "{advice:?}");
         advice.predicted_t_m.unwrap()
     };
-    // At 0.2 m/s, 0.8 m take as long as the time between passes. With two heads, all neighbouring passes are by both.
+    // At 0.2 m/s, the vehicle covers 0.8 m in the time between passes. With only two heads, neighbouring passes
+    // always come from different heads.
     let swept_m = 0.01 * 4.0 * 6.05;
     assert!((t_m(&apart) - t_m(&together) - swept_m).abs() < 0.03, "{} {}", t_m(&apart), t_m(&together));
 }
@@ -380,7 +381,8 @@ fn swing_acts_between_heads_apart() {
 fn position_error_lowers_the_speed_by_its_margin() {
     let mut case = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
     let sure = case.advice();
-    // Two standard deviations of 17 mm, of which 2 mm are free, take 3 cm of the half metre.
+    // The first 2 mm of the standard deviation of 17 mm need no margin. Twice the other 15 mm takes 3 cm of the half
+    // metre.
     case.situation.pass_error_m = 0.017;
     let unsure = case.advice();
     let meets_m = |advice: &Advice, v_mps: f64| {
@@ -392,15 +394,15 @@ fn position_error_lowers_the_speed_by_its_margin() {
     let fast = |advice: &Advice| advice.alternatives[1].unwrap().v_max_mps;
     assert!((meets_m(&unsure, fast(&unsure)) - 0.47).abs() < 1e-3, "{}", fast(&unsure));
     assert!(fast(&sure) > 1.05 * fast(&unsure));
-    // The cost appears as the share of position, and nothing else changes.
+    // The cost appears as the share of position; the other shares are unchanged.
     let [margins, before] = [unsure.margins.unwrap(), sure.margins.unwrap()];
     assert!((margins.swing_mps - before.swing_mps).abs() < 1e-9);
     assert!((margins.position_mps - unsure.v_max_mps).abs() < 1e-9 && margins.pass_error_m >= 0.017);
 }
 
-/// A previously advised speed is kept only if it misses the target by next to nothing, whatever the phases become.
+/// A previously advised speed is kept only if T exceeds the target by at most `EASE`, whatever the phases become.
 #[test]
-fn kept_speed_meets_the_target() {
+fn retained_speed_exceeds_the_target_by_at_most_the_hysteresis() {
     let mut advisor = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0).advisor();
     let mut kept = 0;
     for k in 0..72 {
@@ -414,9 +416,7 @@ fn kept_speed_meets_the_target() {
     assert!(kept > 0, "some speeds are kept");
 }
 
-/// With 30 % lost returns, more than one pass is needed and the speed is lower.
-///
-/// A zero rate costs nothing.
+/// With lost returns, more than one pass over a place is needed, and the speed is lower.
 #[test]
 fn lost_returns_lower_the_speed() {
     let v_mps = |share: f64| {
@@ -429,24 +429,24 @@ fn lost_returns_lower_the_speed() {
     assert!(all[2] < 0.75 * all[0], "{all:?}");
 }
 
-/// Heads far apart meet the target in an interval that reaches up to the advised speed.
+/// Heads far apart meet the target in an interval that ends at the advised speed.
 #[test]
-fn speed_interval_starts_where_the_target_is_met() {
+fn target_is_met_in_the_speed_interval_and_missed_below_it() {
     let case = Case::new(&[0.0, 0.0], &[2.4, 0.0], 0.2, 1.0);
     let advice = case.advice();
     let t_at = |speed_mps: f64| case.t_at_m(&advice, speed_mps);
     let (from, to) = (advice.from_mps, advice.v_max_mps);
-    // At 0.15 m/s, the rear head passes a place just when the front one does again.
+    // At 0.15 m/s, the rear head passes a place at the same time as the front head's next pass.
     assert!(from > 0.15 && to > 1.1 * from, "{from} to {to}");
     assert!((0..=50).map(|k| from + (to - from) * f64::from(k) / 50.0).all(|v| t_at(v) <= 1.0 + 1e-6));
     assert!(t_at(0.985 * from) > 1.0, "{}", t_at(0.985 * from));
 }
 
-/// No speed below a failed one that was ruled out meets the target.
+/// None of the speeds that a failed test rules out meets the target.
 ///
-/// Heads are anywhere along the hull and side by side, with hidden wall, swing and position errors.
+/// The heads are anywhere along the hull and side by side, with hidden wall, swing and position errors.
 #[test]
-fn search_skips_no_speed_that_meets_the_target() {
+fn search_rules_out_no_speed_that_meets_the_target() {
     let mut seed = 7_u64;
     let mut draw = |from: f64, to: f64| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -454,7 +454,7 @@ fn search_skips_no_speed_that_meets_the_target() {
     };
     let (mut found, mut hidden, mut skipped) = (0, 0, 0);
     for number in 0..240 {
-        // Every other case is as tight as possible: two heads in line, and only their phases.
+        // Every other case is as strict as possible: two heads in line, and no effects but their phases.
         let bare = number % 2 == 0;
         let heads = if bare { 2 } else { 2 + number % 3 };
         let angles: Vec<f64> = (0..heads).map(|_| draw(0.0, 360.0)).collect();
@@ -498,9 +498,9 @@ fn search_skips_no_speed_that_meets_the_target() {
     assert!(found > 100 && hidden > 20 && skipped > 10_000, "{found} {hidden} {skipped}");
 }
 
-/// A higher interval is advised once its best speed meets the target with 2 % to spare.
+/// A higher interval is advised once its best speed meets the target with a margin of 2 %.
 ///
-/// While heads run out of phase, such an interval appears and vanishes.
+/// Such intervals appear and vanish while heads run out of phase.
 #[test]
 fn higher_interval_is_advised_once_it_meets_the_target_with_margin() {
     let mut advisor = Case::new(&[0.0, 0.0], &[1.1, 0.0], 0.1, 0.5).advisor();
@@ -530,8 +530,9 @@ fn higher_interval_is_advised_once_it_meets_the_target_with_margin() {
     assert!(jumps > 0 && waited > 0, "{jumps} advised at once, {waited} delayed");
 }
 
-/// Heads 1.1 m apart, started for 0.1 m/s, meet 0.5 m in several intervals: the nearest, and the start of the
-/// highest.
+/// Heads 1.1 m apart, started for 0.1 m/s, meet 0.5 m in several intervals.
+///
+/// The advice contains the nearest of these speeds and the lower end of the highest interval.
 #[test]
 fn nearest_and_highest_speed_intervals_are_advised() {
     let started_deg = 180.0 - 360.0 * 1.1 / (0.1 * 8.0);
@@ -553,7 +554,8 @@ fn nearest_and_highest_speed_intervals_are_advised() {
         };
         outside += 1;
         assert!(t_m(speed_mps) > 0.5 && t_m(nearest_mps) <= 0.5, "{speed_mps}: {nearest_mps}");
-        // Closer speeds, by more than the step of 1 %, miss the target except in the narrowest intervals.
+        // All speeds that are closer, by more than the step of 1 %, miss the target, except in the narrowest
+        // intervals.
         let off = math::ln(nearest_mps / speed_mps).abs() - 0.01;
         for nearer in (1..200).map(|k| 0.003 * f64::from(k)).filter(|nearer| *nearer < off) {
             let by = math::exp(nearer);
@@ -568,9 +570,9 @@ fn nearest_and_highest_speed_intervals_are_advised() {
     );
 }
 
-/// Up to 2 % of the speed is held back where heads run out of phase just above it, instead of 1 %.
+/// The margin is up to 2 % instead of 1 % if heads run out of phase just above the largest speed.
 ///
-/// A vehicle 2 % above the advice then exceeds the target by at most 2 %.
+/// A vehicle 2 % above the advised speed then exceeds the target by at most 2 %.
 #[test]
 fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
     let (mut even, mut steep) = (0, 0);
@@ -598,7 +600,7 @@ fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
             );
             even += 1;
         } else {
-            // No more than necessary.
+            // The margin is no larger than necessary.
             assert!((1.019..1.0203).contains(&over), "{started_mps}: {kept}, {over}");
             steep += 1;
         }
@@ -607,7 +609,7 @@ fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
 }
 
 #[test]
-fn lost_share_is_the_mean_of_turning_heads() {
+fn lost_share_is_the_mean_over_all_shares() {
     assert!((mean([0.1, 0.2, 0.6].into_iter()) - 0.3).abs() < 1e-12);
     assert!(mean(core::iter::empty()).abs() <= 0.0);
 }

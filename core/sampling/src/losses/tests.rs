@@ -13,7 +13,7 @@ fn passes(t_y_m: f64, rates: &[LossRate]) -> f64 {
     sampled(t_y_m).passes_needed(rates.iter().copied())
 }
 
-/// Numbers from 0 to 1 (splitmix64).
+/// Random numbers from 0 to 1 (splitmix64).
 struct Draw(u64);
 
 impl Draw {
@@ -26,7 +26,9 @@ impl Draw {
     }
 }
 
-/// Share of stretches of 0.25 m without an empty circle of the target's diameter, with passes `along_m` apart.
+/// Share of simulated stretches without an empty circle of the target's diameter.
+///
+/// Passes are `along_m` apart; each stretch is 0.25 m long.
 fn share_passed(along_m: f64, t_y_m: f64, rates: &[LossRate], seed: u64) -> f64 {
     const STRETCHES: usize = 80;
     const FINE_M: f64 = 0.02;
@@ -35,7 +37,7 @@ fn share_passed(along_m: f64, t_y_m: f64, rates: &[LossRate], seed: u64) -> f64 
     let turns = (length_m / along_m).ceil() as usize + 1;
     let pings = (PERIMETER_M / t_y_m).round();
     let mut lost = vec![false; rates.len()];
-    // Samples in rows of half a metre along the wall.
+    // Samples, grouped by intervals of half a metre along the tunnel.
     let mut rows = vec![Vec::new(); (length_m / TARGET_M) as usize + 3];
     for turn in 0..turns {
         let head = turn % rates.len();
@@ -89,14 +91,14 @@ fn required_passes_let_19_of_20_stretches_pass() {
         for (seed, rate) in (1..).zip(rates) {
             let passes = passes(t_y_m, &[rate]);
             let share = share_passed(along_m(t_y_m, passes), t_y_m, &[rate], seed);
-            // Over 80 stretches; neighbouring ones share holes.
+            // The sample has 80 stretches, and neighbouring stretches share holes.
             assert!(share >= 0.87, "steps of {t_y_m} m, {rate:?}: {passes:.2} passes, {share:.2} pass");
         }
     }
 }
 
 #[test]
-fn notably_fewer_passes_let_fewer_stretches_pass() {
+fn too_few_passes_let_fewer_than_9_in_10_stretches_pass() {
     let rates =
         [LossRate::independent(0.2), LossRate::independent(0.5), LossRate { share: 0.2, after_lost: 0.8 }];
     for t_y_m in [0.07, 0.1] {
@@ -109,13 +111,13 @@ fn notably_fewer_passes_let_fewer_stretches_pass() {
 }
 
 #[test]
-fn silent_head_leaves_its_passes_to_the_others() {
+fn passes_of_a_silent_head_are_replaced_by_other_heads() {
     let sound = LossRate::default();
     let deaf = LossRate::independent(1.0);
     assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf, deaf, sound, sound]) - 3.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf]) - MOST_PASSES).abs() < 1e-12);
-    // Losses of that head, too, cost more than either alone.
+    // If the other heads also lose returns, the losses of both kinds cost more than either kind alone.
     let lossy = LossRate::independent(0.1);
     let all = passes(0.1, &[deaf, lossy, lossy, lossy]);
     assert!(all > 2.05 && all > passes(0.1, &[lossy; 4]), "{all}");
@@ -131,7 +133,7 @@ fn required_passes_grow_continuously_with_losses() {
         for k in 0..4980 {
             let [mut low, mut high] = [k, k + 1].map(|k| 0.002 + 2e-4 * f64::from(k));
             assert!(at(high) >= at(low) - 1e-9, "steps of {t_y_m} m, {high}: {} to {}", at(low), at(high));
-            // The slope is steep where a run becomes as wide as the target.
+            // The number rises steeply where a run becomes as wide as the target.
             for _ in 0..40 {
                 let middle = f64::midpoint(low, high);
                 if at(middle) - at(low) > at(high) - at(middle) { high = middle } else { low = middle }
@@ -145,13 +147,13 @@ fn required_passes_grow_continuously_with_losses() {
 fn no_extra_passes_without_losses_or_without_a_speed() {
     assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
-    // With steps longer than the target there is no speed to reduce.
+    // If steps are longer than the target, no speed meets the target.
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
 }
 
-/// Chance losses make small holes often and large ones never.
+/// Chance losses often make small holes and never large ones.
 ///
-/// Without chance losses there are no chance holes.
+/// Without chance losses, no hole is by chance.
 #[test]
 fn hole_is_by_chance_if_enough_losses_can_coincide() {
     let hole = |hole_m: f64, rate: LossRate| sampled(0.1).is_by_chance(hole_m, 0.3, rate);
@@ -161,7 +163,7 @@ fn hole_is_by_chance_if_enough_losses_can_coincide() {
     let [never, runs] = [LossRate::default(), LossRate { share: 0.58, after_lost: 0.98 }];
     assert!(!hole(0.55, never));
     assert!(hole(2.0, runs), "most of each turn is lost in long runs");
-    // The same hole is more likely with higher losses, and a smaller hole is more likely.
+    // A hole that is by chance remains so with higher losses, and smaller holes are by chance as well.
     for share in 1..9 {
         let rate = LossRate::independent(f64::from(share) / 10.0);
         let largest = |from: i32| (from..60).rev().find(|n| hole(f64::from(*n) / 20.0, rate)).unwrap_or(0);

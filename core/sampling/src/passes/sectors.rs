@@ -1,4 +1,4 @@
-//! Heads in sectors: timing of neighbours at the end that their sectors share.
+//! Heads in sectors: timing of neighbouring heads at the end that their sectors share.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,23 +6,23 @@ use crate::head::{HeadMotion, MAX_HEADS, faces_aft};
 use crate::occlusion::AngleRange;
 use headrace_geometry::math::{self, TAU};
 
-/// Unevenness assumed for neighbours with unknown sweeps: both reach their ends at once.
+/// Unevenness assumed for neighbouring heads with unknown sweeps: both reach the shared end at once.
 pub(super) const AT_ONCE: f64 = 0.5;
 
 /// Position of a head in its sweep through its sector, there and back.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Leg {
-    /// Number of its sector, and how many there are, in the body's sense of rotation.
+    /// Number of the head's sector and number of all sectors, in the body's sense of rotation.
     sector: i64,
     of: i64,
-    /// Share of a sweep there and back since the beginning of the sector, 0 to 1.
+    /// Share of a sweep there and back, counted from the beginning of the sector, 0 to 1.
     share: f64,
 }
 
 impl Leg {
-    /// Creates it for a head that turns within `sector`, angles in its sensor frame.
+    /// Creates the position of a head that turns within `sector`; `None` for a sector without a size.
     ///
-    /// `None` for a sector without a size.
+    /// The angles of `sector` are in the head's sensor frame.
     pub(super) fn of(motion: &HeadMotion, sector: &AngleRange) -> Option<Self> {
         let size_rad = Some(sector.size_rad).filter(|size_rad| *size_rad > 0.0)?;
         let along = math::wrap_signed(motion.angle_rad - sector.middle_rad(), TAU) / size_rad + 0.5;
@@ -43,11 +43,11 @@ impl Leg {
     }
 }
 
-/// Largest unevenness of neighbours at the end that their sectors share.
+/// Largest unevenness of neighbouring heads at the end that their sectors share.
 ///
-/// It is a share of the advance in a sweep there and back. 0 if one comes half a sweep after the other; [`AT_ONCE`]
-/// if both come at the same place or the timing is unknown. `ahead` is the position of each head along the hull, as a
-/// share of that advance.
+/// The unevenness is a share of the vehicle's advance in a sweep there and back. It is 0 if one head comes half a
+/// sweep after the other, and [`AT_ONCE`] if both come at the same place or the timing is unknown. `ahead` is the
+/// position of each head along the hull, as a share of that advance.
 pub(super) fn uneven(legs: &[Option<Leg>; MAX_HEADS], ahead: &[f64; MAX_HEADS]) -> f64 {
     let known = || legs.iter().zip(ahead).filter_map(|(leg, ahead)| Some(((*leg)?, *ahead)));
     let mut most: Option<f64> = None;
@@ -72,8 +72,9 @@ mod tests {
     use headrace_geometry::frames::{Mount, Rot, Vec3};
     use headrace_geometry::time::DurNs;
 
-    /// Two heads ahead and two aft-facing ones behind, started for a speed: by their programs, and by the speed they
-    /// move at.
+    /// The heads are two in front and two aft-facing ones behind.
+    ///
+    /// The unevenness is tested at the planned speed and 10 % above it.
     #[test]
     fn sector_heads_are_even_only_at_the_planned_speed() {
         const SWEEP_S: f64 = 4.0;
@@ -104,7 +105,7 @@ mod tests {
                 };
                 // One step of a head is 1/200 of the sweep.
                 assert!(at(speed_mps) < 0.011, "{speed_mps} m/s, {at_s} s: {}", at(speed_mps));
-                // The rear heads come to a place 1.1 m / v after those in front.
+                // The rear heads reach a place 1.1 m / v after the front heads.
                 let later_s = 2.0 * x_m / speed_mps - 2.0 * x_m / (1.1 * speed_mps);
                 let off = math::wrap_signed(later_s / SWEEP_S, 1.0).abs();
                 assert!((at(1.1 * speed_mps) - off).abs() < 0.011, "{speed_mps} m/s, {at_s} s: {off}");
@@ -123,7 +124,7 @@ mod tests {
         for (head, ((slot, spec), program)) in legs.iter_mut().zip(specs).zip(programs).enumerate() {
             let (from_rad, size_rad) = program.sector.unwrap();
             let angle_rad = |at_s: f64| schedule.angle_rad(head, DurNs::from_secs_f64(at_s)).unwrap();
-            // Angles as received: at the last ping, and with the step to it.
+            // A received angle is the angle at the last ping; the step is the difference from the ping before.
             let pings = (at_s / spec.ping_period_s).floor() * spec.ping_period_s + 1e-6;
             let step_rad = math::wrap_signed(angle_rad(pings) - angle_rad(pings - spec.ping_period_s), TAU);
             let motion = HeadMotion {

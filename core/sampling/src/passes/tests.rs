@@ -41,7 +41,7 @@ fn evenly_phased_heads_share_the_turn() {
     assert!(errors[..4].iter().all(|error| error.unwrap().abs() < 1e-9) && errors[4].is_none());
     let planned = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     assert!((all(&planned) - 2.0).abs() < 1e-12);
-    // Side by side, they see a place at angles that differ by up to 9 degrees, a fortieth of a turn.
+    // Heads side by side see a place at angles that differ by up to 9 degrees, a fortieth of a turn.
     assert!((all(&planned.beside(TAU / 40.0)) - 2.2).abs() < 1e-12);
     assert!((planned.beside(TAU / 40.0).gap_s(HeadSet::first(1)).unwrap() - 8.0).abs() < 1e-12);
 }
@@ -51,20 +51,21 @@ fn place_hidden_from_some_heads_has_longer_gaps() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
-    // Half a turn apart, the gap doubles. A quarter apart, two successive passes are missing.
+    // Without two heads half a turn apart, the gap doubles. Without two heads a quarter turn apart, two successive
+    // passes are missing.
     assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
     assert_eq!(passes.gap_s(HeadSet::default()), None);
     assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
 }
 
 #[test]
-fn several_passes_share_the_rest_of_the_turn() {
+fn time_for_several_passes_fills_up_whole_turns() {
     let even = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let time_s = |heads: HeadSet, needed: f64| even.time_for_s(heads, even.gap_s(heads).unwrap(), needed);
     let all = even.heads();
     assert!((time_s(all, 1.0) - 2.0).abs() < 1e-12 && (time_s(all, 2.5) - 5.0).abs() < 1e-12);
     assert!((time_s(all, 9.0) - 18.0).abs() < 1e-12);
-    // Two heads a quarter of a turn apart: 6 s, then 2 s.
+    // Two heads a quarter of a turn apart pass with gaps of 6 s and 2 s in turn.
     let two = all.without(0).without(1);
     for (needed, seconds) in [(1.0, 6.0), (1.5, 7.0), (2.0, 8.0), (3.0, 14.0), (4.0, 16.0)] {
         assert!((time_s(two, needed) - seconds).abs() < 1e-9, "{needed}");
@@ -77,11 +78,12 @@ fn several_passes_share_the_rest_of_the_turn() {
 }
 
 #[test]
-fn heads_together_pass_together() {
+fn heads_at_one_place_with_equal_angles_pass_together() {
     let together = passes(&[0.0, 0.0], &[0.0, 0.0]);
     assert!((all(&together) - 8.0).abs() < 1e-9 && (together.even_gap_s() - 4.0).abs() < 1e-12);
     assert!((together.phase_errors_rad(2)[1].unwrap().abs() - math::PI).abs() < 1e-9);
-    // Half a pitch apart along the hull, equal angles interleave: at 0.2 m/s and 8 s per turn, 0.8 m.
+    // Heads half a pitch apart along the hull interleave at equal angles: half a pitch is 0.8 m at 0.2 m/s and 8 s
+    // per turn.
     let apart = passes(&[0.0, 0.0], &[0.8, 0.0]);
     assert!((all(&apart) - 4.0).abs() < 1e-9);
 }
@@ -92,10 +94,11 @@ fn reversed_vehicle_reverses_the_order_of_heads() {
     let out = Phasing::of(&back).at(0.2);
     let turned = Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI);
     back.pose = Some(Pose { position: headrace_geometry::frames::Point3::zero(), attitude: turned });
-    // A return nose first mirrors the way out nose first; a return tail first does not.
+    // Travelling back with the nose ahead mirrors travelling out with the nose ahead. Travelling back with the tail
+    // ahead does not.
     assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
     assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
-    // At a yaw, heads are farther apart along the tunnel. If their planes lie along it, there is no phase.
+    // If the vehicle yaws, the distance of heads along the tunnel grows. Scan planes along the tunnel have no phase.
     let askew = |yaw: f64| Rot::from_roll_pitch_yaw(0.0, 0.0, yaw);
     let mount = Mount { position: Vec3::new(1.0, 0.0, 0.0), rotation: Rot::identity() };
     assert!((ahead_m(&askew(0.5), &mount).unwrap() - 1.0 / math::cos(0.5)).abs() < 1e-12);
@@ -104,10 +107,11 @@ fn reversed_vehicle_reverses_the_order_of_heads() {
 
 #[test]
 fn late_head_has_a_positive_phase_error() {
-    // The second of two heads should be half a turn ahead, but is 30 degrees short of that.
+    // The second of two heads should be half a turn ahead, but is only 150 degrees ahead.
     let passes = passes(&[0.0, 150.0], &[0.0, 0.0]);
     assert!((passes.phase_errors_rad(2)[1].unwrap() - f64::to_radians(30.0)).abs() < 1e-9);
-    // At 10 % above the planned speed, a head 1.6 m astern (one turn's advance) is early by 0.1 / 1.1 of a turn.
+    // At 10 % above the planned speed, the error of a head 1.6 m astern (the advance of one turn) is 1 - 1 / 1.1 of a
+    // turn.
     let at = |speed| Phasing::of(&situation(&[0.0, 180.0], &[1.6, 0.0])).at(speed).phase_errors_rad(2)[1];
     assert!(at(0.2).unwrap().abs() < 1e-9);
     assert!((at(0.22).unwrap() - TAU * (1.0 - 1.0 / 1.1)).abs() < 1e-9, "{:?}", at(0.22));
@@ -129,7 +133,7 @@ fn reversed_heads_are_phased_alike_and_opposed_heads_are_not() {
 }
 
 #[test]
-fn heads_out_of_step_count_as_the_fastest_one() {
+fn heads_out_of_step_have_the_gap_of_the_fastest_one() {
     let mut mixed = situation(&[0.0, 180.0], &[0.0, 0.0]);
     if let Some(second) = mixed.heads.iter_mut().flatten().nth(1) {
         second.rate_radps = TAU / 21.6;
@@ -140,13 +144,13 @@ fn heads_out_of_step_count_as_the_fastest_one() {
 }
 
 #[test]
-fn turning_point_does_not_make_a_phase_shift_layout_a_sector() {
+fn measured_sector_is_ignored_in_a_phase_shift_layout() {
     let mut jerked = situation(&[0.0, 180.0], &[0.0, 0.0]);
     for head in jerked.heads.iter_mut().flatten() {
         head.sector_rad = Some(f64::to_radians(0.9));
     }
     assert!((all(&Phasing::of(&jerked).at(0.2)) - 4.0).abs() < 1e-9);
-    // In sectors, an unmeasured sector is half a turn for two heads, there and back.
+    // In the sector layout, an unmeasured sector of one of two heads counts as half a turn, swept there and back.
     let mut sectors = situation(&[0.0, 180.0], &[0.0, 0.0]);
     sectors.layout = HeadLayout::SectorOffset;
     assert!((all(&Phasing::of(&sectors).at(0.2)) - 8.0).abs() < 1e-9);
@@ -164,7 +168,7 @@ fn remaining_heads_share_the_turn_evenly() {
 }
 
 #[test]
-fn parallax_grows_towards_the_wall() {
+fn parallax_is_larger_in_a_narrow_tunnel() {
     let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
     let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
     let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);
@@ -175,7 +179,7 @@ fn parallax_grows_towards_the_wall() {
 
 /// The result does not depend on the position of the vehicle's origin along the hull.
 #[test]
-fn successive_heads_are_apart_by_a_share_of_the_hull() {
+fn mean_distance_of_successive_heads_is_a_share_of_their_spread() {
     for origin_m in [-3.0, 0.0, 0.4, 5.0] {
         let at = |x_m: &[f64]| {
             let x_m: Vec<f64> = x_m.iter().map(|x_m| x_m + origin_m).collect();
@@ -187,7 +191,8 @@ fn successive_heads_are_apart_by_a_share_of_the_hull() {
             (vec![0.9, -0.3], 1.2, 1.0),
             (vec![0.9, 0.9, -0.3, -0.3], 1.2, 0.5),
             (vec![0.9, -0.3, 0.9, -0.3], 1.2, 1.0),
-            // The last head is followed by the first over the full distance, and two steps cover half each.
+            // The mean is over two steps of half the distance, and the whole distance from the last head back to the
+            // first.
             (vec![0.0, 0.4, 0.8], 0.8, 2.0 / 3.0),
             (vec![0.7, 0.7], 0.0, 0.0),
             (vec![0.7], 0.0, 0.0),
@@ -199,7 +204,7 @@ fn successive_heads_are_apart_by_a_share_of_the_hull() {
             assert_eq!(heads.fits_some_speeds(), apart_m > 0.0, "{x_m:?}");
         }
     }
-    // Heads out of step have no order.
+    // Heads out of step have no order and thus no distance.
     let mut loose = situation(&[0.0, 180.0], &[0.9, -0.3]);
     loose.heads[1].as_mut().unwrap().rate_radps = -TAU / 8.0;
     let heads = Phasing::of(&loose);
@@ -208,7 +213,7 @@ fn successive_heads_are_apart_by_a_share_of_the_hull() {
     );
 }
 
-/// Heads apart along the hull share the turn at the scheduled speed from any present position, and at no other speed.
+/// Scheduled heads share the turn evenly at the planned speed, whatever their positions along the hull.
 #[test]
 fn scheduled_heads_share_the_turn_at_the_planned_speed() {
     for x_m in [[0.8, 0.0, -0.5], [0.0, 1.3, 0.2]] {
@@ -216,7 +221,7 @@ fn scheduled_heads_share_the_turn_at_the_planned_speed() {
         let gap_s = |mps: f64| all(&phasing.at(mps));
         assert!((gap_s(0.1) - 8.0 / 3.0).abs() < 1e-9, "{x_m:?}: {}", gap_s(0.1));
         assert!(gap_s(0.13) > 3.0, "{x_m:?}: {}", gap_s(0.13));
-        // A schedule for speed zero is for heads at one place of the hull.
+        // A schedule for speed zero assumes heads at one place of the hull.
         let at_rest = Phasing::of(&situation(&[3.0, 200.0, 77.0], &[0.0; 3])).as_scheduled(3, 0.0);
         assert!((all(&at_rest.at(0.1)) - 8.0 / 3.0).abs() < 1e-9);
     }

@@ -10,8 +10,8 @@ use crate::spacing::Spiral;
 
 /// A planning question.
 ///
-/// A target asks for the speed. A speed or a time asks for the target that it allows. Both together ask whether they
-/// are compatible.
+/// A target asks for the speed. A speed or a time asks for the target that can be met. A target with a speed or time
+/// asks whether both are compatible.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
     /// Target T, m.
@@ -22,26 +22,26 @@ pub struct Question {
     pub time_s: Option<f64>,
 }
 
-/// The answer for one mode; figures along the tunnel are at `speed_mps`.
+/// The answer for one mode; distances along the tunnel are at `speed_mps`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
     /// The mode.
     pub mode: &'static str,
     /// theta, degrees.
     pub step_deg: f64,
-    /// n: pings to a turn. Eq. 3.
+    /// n: pings per turn. Eq. 3.
     pub steps_per_turn: u32,
     /// T: time of a turn, seconds.
     pub turn_s: f64,
-    /// Source of that time: `measured`, `table` or `estimated`.
+    /// Source of the turn period: `measured`, `table` or `estimated`.
     pub turn_basis: &'static str,
-    /// epsilon: overlap of neighbouring beams; below 1, none. Eq. 22.
+    /// epsilon: overlap of neighbouring beams; below 1, beams do not overlap. Eq. 22.
     pub overlap: f64,
-    /// T_y at rest and at the nominal pose, straight-line distance between samples: smallest, m. Eq. 5 or 7.
+    /// Smallest T_y: straight-line distance between samples, at rest and at the nominal pose, m. Eq. 5 or 7.
     pub t_y_min_rest_m: f64,
-    /// The same: mean, m. Eq. 10.
+    /// Mean T_y under the same conditions, m. Eq. 10.
     pub t_y_mean_rest_m: f64,
-    /// The same: largest, m. Eq. 6.
+    /// Largest T_y under the same conditions, m. Eq. 6.
     pub t_y_max_rest_m: f64,
     /// T_yp: upper bound of the mean, m. Eq. 10.
     pub t_yp_m: f64,
@@ -49,25 +49,25 @@ pub struct Answer {
     pub t_y2_m: f64,
     /// The largest speed that meets the target, m/s.
     pub v_max_mps: Option<f64>,
-    /// The largest speeds with the margins added one after the other; the last is `v_max_mps`.
+    /// The largest speeds as the margins are added one after the other; the last speed is `v_max_mps`.
     pub margins: Option<Margins>,
-    /// Hours at that speed for the whole length.
+    /// Time for the whole length at `v_max_mps`, hours.
     pub needed_h: Option<f64>,
     /// Reason why no speed meets the target: `angular_step`, `unseen_strip` or `off_axis`.
     pub reason: Option<&'static str>,
-    /// The same as a message.
+    /// Message for the reason why no speed meets the target.
     pub refused: Option<String>,
-    /// Speed of the figures below, m/s: the one in the question, or else `v_max_mps`.
+    /// Speed that the fields below refer to, m/s: the speed in the question, or else `v_max_mps`.
     pub speed_mps: Option<f64>,
-    /// Spacing at that speed.
+    /// Spacing at `speed_mps`.
     pub spacing: Option<Spacing>,
-    /// Part of the target reserved for position errors at that speed, m; zero if they are unknown.
+    /// Part of the target reserved for position errors at `speed_mps`, m; zero if the errors are unknown.
     pub position_margin_m: f64,
-    /// Whether the target is met at the speed in the question, position errors included.
+    /// Whether the speed in the question meets the target, position errors included.
     pub meets_target: Option<bool>,
     /// Whether the time in the question is enough at `v_max_mps`.
     pub suffices: Option<bool>,
-    /// Whether it is the best of the modes.
+    /// Whether this mode is the best of all modes.
     pub best: bool,
 }
 
@@ -80,31 +80,34 @@ pub struct Spacing {
     pub pitch_m: f64,
     /// T_x where all heads see the wall.
     pub t_x_m: f64,
-    /// T_x on the strip with the longest gap between passes.
+    /// T_x on the strip with the longest time between passes.
     pub t_x_hidden_m: f64,
-    /// T_ymin, including the advance. Eq. 14.
+    /// T_ymin, including the advance between two pings. Eq. 14.
     pub t_y_min_m: f64,
-    /// Mean T_y, including the advance.
+    /// Mean T_y, including the advance between two pings.
     pub t_y_mean_m: f64,
-    /// T_ymax, including the advance. Eq. 13.
+    /// T_ymax, including the advance between two pings. Eq. 13.
     pub t_y_max_m: f64,
     /// T_min. Eq. 18.
     pub t_min_m: f64,
     /// T_mean. Eq. 17.
     pub t_mean_m: f64,
-    /// T_max at any tolerated pose, including hidden strips. Eq. 16. `None` if no head sees a strip.
+    /// Largest T_max over all tolerated poses; `None` if no head sees some strip. Eq. 16.
+    ///
+    /// Hidden strips are included.
     pub t_max_m: Option<f64>,
-    /// Size of the smallest feature that is certain to be hit once.
+    /// Size of the smallest feature that is certain to get one sample.
     pub hit_once_m: Option<f64>,
-    /// Size of the smallest feature that is certain to be hit twice, as in the sampling theorem.
+    /// Size of the smallest feature that is certain to get two samples, as the sampling theorem requires.
     pub hit_twice_m: Option<f64>,
 }
 
 impl Planner {
     /// Returns the answers for all modes, or for the mode `only`.
     ///
-    /// Errors: no target, speed or time; one that isn't above zero. A target that a mode can't meet is an answer, not
-    /// an error.
+    /// A target that a mode can't meet is an answer, not an error.
+    ///
+    /// Errors: no target, speed or time; a value that isn't above zero.
     pub fn answers(&self, question: &Question, only: Option<&str>) -> Result<Vec<Answer>, SamplingError> {
         let Question { target_m, speed_mps, time_s } = *question;
         let length_m = self.inspection().length_m;
@@ -210,7 +213,7 @@ struct Asked {
     needed_mps: Option<f64>,
 }
 
-/// Marks the best mode: the fastest for the target, or the finest at the speed in the question.
+/// Marks the best mode: the fastest mode for a target, or the mode with the smallest T_max for a speed.
 fn mark_best(answers: &mut [Answer], asked: &Asked) {
     let t_max = |answer: &Answer| answer.spacing.and_then(|spacing| spacing.t_max_m);
     let best = if asked.asked_mps.is_some() {

@@ -15,7 +15,7 @@ use headrace_geometry::math::{self, TAU};
 pub struct Briefing {
     /// The mode.
     pub mode: &'static str,
-    /// The speed, m/s.
+    /// The speed of the briefing, m/s.
     pub speed_mps: f64,
     /// Angles hidden from each head.
     pub hidden: Vec<Hidden>,
@@ -34,28 +34,28 @@ pub struct Briefing {
 pub struct Hidden {
     /// The head.
     pub head: usize,
-    /// Its middle, degrees in the sensor frame.
+    /// Middle of the range, degrees in the sensor frame.
     pub middle_deg: f64,
-    /// Its size, degrees.
+    /// Size of the range, degrees.
     pub size_deg: f64,
-    /// Length of wall that it hides, m.
+    /// Length of the hidden wall, m.
     pub wall_m: f64,
-    /// Clock position of the middle of that wall, looking along the tunnel.
+    /// Clock position of the hidden wall's middle, looking along the tunnel.
     pub clock: String,
 }
 
 /// A strip of the wall with fewer passes than the rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThinStrip {
-    /// Arc length of its start, m.
+    /// Arc length of the strip's start, m.
     pub from_m: f64,
-    /// Its width, m.
+    /// Width of the strip, m.
     pub width_m: f64,
-    /// Clock position of its middle.
+    /// Clock position of the strip's middle.
     pub clock: String,
-    /// The heads that see it.
+    /// The heads that see the strip.
     pub seen_by: Vec<usize>,
-    /// Ratio of T_x there to the smallest T_x of any strip; `None` if no head sees it.
+    /// Ratio of the strip's T_x to the smallest T_x of any strip; `None` if no head sees the strip.
     pub t_x_factor: Option<f64>,
 }
 
@@ -64,11 +64,11 @@ pub struct ThinStrip {
 pub struct Start {
     /// The head.
     pub head: usize,
-    /// Angle of its first ping, degrees in the sensor frame.
+    /// Angle of the first ping, degrees in the sensor frame.
     pub angle_deg: f64,
-    /// Whether its angle grows from there.
+    /// Whether the angle grows after the first ping.
     pub growing: bool,
-    /// Its sector: least angle and size, degrees.
+    /// Least angle and size of the sector, degrees.
     pub sector_deg: Option<[f64; 2]>,
 }
 
@@ -79,7 +79,7 @@ pub struct HullAdvice {
     pub head: usize,
     /// Distance behind the foremost head, m.
     pub behind_m: f64,
-    /// Number of s-ths of a turn in which the vehicle travels that far, to the nearest.
+    /// Number of s-ths of a turn in which the vehicle travels that distance, rounded to the nearest.
     pub q: u32,
     /// The speed that fits the rule, m/s.
     pub speed_mps: f64,
@@ -92,9 +92,9 @@ pub struct HullAdvice {
 pub struct Heard {
     /// The two heads.
     pub heads: [usize; 2],
-    /// Face to face, seconds of each turn or sweep.
+    /// Time for which the beams point at each other's heads, seconds per turn or sweep.
     pub facing_s: f64,
-    /// On the same patch of wall, seconds of each turn or sweep.
+    /// Time for which the beams hit the same patch of wall, seconds per turn or sweep.
     pub same_patch_s: f64,
     /// Period of the turn or sweep, seconds.
     pub of_s: f64,

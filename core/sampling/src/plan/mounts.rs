@@ -1,4 +1,4 @@
-//! Gain in speed from another mount of the heads.
+//! Gain in speed from mounting the heads in line along the hull.
 
 use serde::Serialize;
 
@@ -6,28 +6,30 @@ use super::{Inspection, Planner};
 use crate::error::SamplingError;
 use headrace_geometry::frames::Vec3;
 
-/// Gap left between two heads along the hull, m: for connectors and cables.
+/// Gap between two heads in line along the hull, m, for connectors and cables.
 const GAP_M: f64 = 0.05;
 /// Distance below which two mounts count as the same, m.
 const SAME_M: f64 = 0.01;
 
-/// Heads in line along the hull through their common middle, so that none hides the wall from another.
+/// Heads in line along the hull, so that no head hides the wall from another.
+///
+/// The line passes through the mean of the heads' present positions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InLine {
     /// Position of each head in the body frame, m, in the order of the heads.
     pub positions_m: Vec<[f64; 3]>,
-    /// Fastest mode there.
+    /// Fastest mode with the heads in line.
     pub mode: &'static str,
-    /// Largest speed at which sections pass there, m/s.
+    /// Largest speed at which sections pass with the heads in line, m/s.
     pub v_max_mps: f64,
-    /// The same for the present mounts, in their fastest mode, m/s; `None` if none meets the target.
+    /// Largest speed with the present mounts in their fastest mode, m/s; `None` if no mode meets the target.
     pub present_mps: Option<f64>,
 }
 
 impl Planner {
     /// Returns the best speed with the heads in line.
     ///
-    /// `None` if they already are, or if no mode meets the target then.
+    /// `None` if the heads already are in line, or if no mode meets the target with heads in line.
     ///
     /// Errors: as for [`Planner::new`].
     pub fn in_line(&self, target_m: f64) -> Result<Option<InLine>, SamplingError> {
@@ -43,7 +45,7 @@ impl Planner {
         }))
     }
 
-    /// The fastest mode for a target and its speed, m/s.
+    /// Returns the fastest mode for a target, and the largest speed in this mode, m/s.
     fn fastest(&self, target_m: f64) -> Option<(&'static str, f64)> {
         let speeds = self.modes.iter().enumerate().filter_map(|(number, planned)| {
             Some((planned.mode.name, self.v_max_mps(number, target_m).ok()?))
@@ -52,7 +54,9 @@ impl Planner {
     }
 }
 
-/// The inspection with the heads in line, in their order along the hull; `None` if they already are.
+/// Returns the inspection with the heads in line; `None` if the heads already are in line.
+///
+/// The order of the heads along the hull is unchanged.
 fn in_line(inspection: &Inspection) -> Option<Inspection> {
     let mut moved = inspection.clone();
     let count = moved.heads.len() as f64;
@@ -75,7 +79,7 @@ fn in_line(inspection: &Inspection) -> Option<Inspection> {
         spec.mount.position = Vec3::new(at_m, y_m, z_m);
         last = Some((at_m, long_m));
     }
-    // Centred, so that both sides extend equally.
+    // The line is centred on the heads' present middle, so that it extends equally ahead and astern.
     let shift_m = x_m - moved.heads.iter().map(|(spec, _)| spec.mount.position.x()).sum::<f64>() / count;
     let mut farthest_m: f64 = 0.0;
     for ((spec, _), (before, _)) in moved.heads.iter_mut().zip(&inspection.heads) {

@@ -1,4 +1,4 @@
-//! Prediction of the live advice: the largest speed for heads that were started for another one.
+//! Prediction of the live advice: the largest speed for heads that were started for another speed.
 
 use super::Planner;
 use crate::advice::{Advisor, Looks, Task};
@@ -12,8 +12,8 @@ use crate::swing::Swing;
 impl Planner {
     /// Returns the largest speed in a mode for heads started for `planned_mps`, m/s.
     ///
-    /// Zero if no speed meets the target. It equals the live advice, margins included, for a steady vehicle on the
-    /// axis.
+    /// Zero if no speed meets the target. For a steady vehicle on the axis, the result equals the live advice,
+    /// margins included.
     ///
     /// Errors: no such mode; a target or a speed that isn't above zero; heads that the layout doesn't allow.
     pub fn as_started_mps(&self, mode: usize, target_m: f64, planned_mps: f64) -> Result<f64, SamplingError> {
@@ -60,7 +60,7 @@ impl Planner {
             lost_at_most: LossRate::default(),
         };
         let mut advisor = Advisor::new(&inspection.profile, task, &heads, &inspection.hull);
-        // Each call recasts one of several outdated rings.
+        // Each call recasts a single outdated ring.
         let calls = 0..specs.len().max(1);
         let advised = calls.map(|_| advisor.advise(&situation, Swing::default(), None).v_max_mps);
         Ok(advised.last().unwrap_or(0.0))

@@ -47,7 +47,7 @@ fn ideal(count: usize) -> Inspection {
     inspection(vec![head([0.0; 3], false, 0.0); count], HeadLayout::PhaseShift)
 }
 
-/// VITA 2 with four heads: two side by side in front, two aft.
+/// VITA 2 with four heads: two side by side in front, two side by side aft.
 fn vita_2(layout: HeadLayout) -> Inspection {
     let places = [([0.551, 0.15, 0.0], false), ([0.551, -0.15, 0.0], false)];
     let aft = [([-0.551, 0.15, 0.0], true), ([-0.551, -0.15, 0.0], true)];
@@ -60,7 +60,7 @@ fn speed(target_m: f64) -> Question {
 }
 
 #[test]
-fn v_max_gives_the_target_in_the_forward_equations() {
+fn t_max_at_the_largest_speed_equals_the_target() {
     let drifting = Inspection { drift_m: 1.0, yaw_rad: 0.2, ..vita_2(HeadLayout::PhaseShift) };
     let sectors = vita_2(HeadLayout::SectorOffset);
     for inspection in [ideal(1), ideal(2), ideal(4), vita_2(HeadLayout::PhaseShift), drifting, sectors] {
@@ -79,8 +79,9 @@ fn v_max_gives_the_target_in_the_forward_equations() {
     }
 }
 
-/// The reference table: T_max of Eq. 16, here for the worst start angle of the pings, which gives at most a little
-/// more.
+/// The reference table lists T_max of Eq. 16.
+///
+/// The planner takes the worst start angle of the pings, so its T_max is at most slightly larger.
 #[test]
 fn ideal_heads_give_the_reference_table() {
     let expected = [
@@ -126,7 +127,7 @@ fn sector_heads_look_outwards_and_leave_floor_and_crown_unseen() {
     assert!(planner.hidden().iter().all(|ranges| ranges.len() == 1));
     let strips = planner.nominal_strips().unwrap().as_slice();
     let unseen: Vec<_> = strips.iter().filter(|strip| strip.seen_by.is_empty()).collect();
-    // The sectors are free of occlusion, but heads 0.3 m apart leave floor and crown between them unseen.
+    // The sectors are free of occlusion. Heads 0.3 m apart leave strips between them unseen, on floor and crown.
     assert_eq!(unseen.len(), 2, "{strips:?}");
     assert!(unseen.iter().all(|strip| (strip.arc.length_m - 0.3).abs() < 0.01));
     let answers = planner.answers(&speed(0.4), None).unwrap();
@@ -139,7 +140,7 @@ fn sector_heads_look_outwards_and_leave_floor_and_crown_unseen() {
 }
 
 #[test]
-fn question_with_target_gives_speed_and_with_time_gives_target() {
+fn target_gives_speed_and_time_gives_target() {
     let planner = Planner::new(ideal(2)).unwrap();
     let answers = planner.answers(&speed(1.0), None).unwrap();
     let best: Vec<_> = answers.iter().filter(|answer| answer.best).map(|answer| answer.mode).collect();
@@ -193,11 +194,11 @@ fn impossible_plan_names_the_cause() {
     assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
 }
 
-/// One head in the centre loses nothing to margins.
+/// One head in the centre loses no speed to margins.
 ///
-/// Four heads of a vehicle lose something to each of the first ones.
+/// Four heads of a vehicle lose speed to hidden wall and phases.
 #[test]
-fn margins_go_from_the_geometry_alone_to_the_largest_speed() {
+fn each_margin_lowers_the_speed_down_to_the_largest_planned_speed() {
     for (inspection, loses) in [(ideal(1), false), (vita_2(HeadLayout::PhaseShift), true)] {
         let planner = Planner::new(inspection).unwrap();
         let (mode, target_m) = (2, 0.5);
@@ -212,7 +213,7 @@ fn margins_go_from_the_geometry_alone_to_the_largest_speed() {
     }
 }
 
-/// The reach of all heads is the shortest of their ranges; the pings of a mode are those of a turn.
+/// The reach is that of the shortest range of any head; the ping period follows from the turn.
 #[test]
 fn plan_states_its_reach_and_ping_period() {
     let mut shorter = ideal(2);
@@ -243,7 +244,7 @@ fn drift_and_yaw_never_improve_the_plan() {
 }
 
 #[test]
-fn perimeter_shows_corners_hidden_strips_and_sectors() {
+fn spacing_around_the_perimeter_includes_corners_hidden_strips_and_sectors() {
     let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
     let places = planner.perimeter(2, 0.1, 720).unwrap();
     let most = places.iter().map(|place| place.t_y_m).fold(0.0, f64::max);
@@ -262,7 +263,7 @@ fn perimeter_shows_corners_hidden_strips_and_sectors() {
 }
 
 #[test]
-fn pattern_equals_the_samples_of_the_heads() {
+fn sample_pattern_counts_pings_sweeps_and_hidden_angles() {
     let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
     let samples = planner.pattern(2, 0.1, 2.0).unwrap();
     assert_eq!(samples.len(), 4 * 801);
@@ -283,13 +284,13 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
     let [places, sides]: [Vec<f64>; 2] =
         [0, 1].map(|k| gain.positions_m.iter().map(|place| place[k]).collect());
     assert_eq!(sides, [0.0; 4]);
-    // They extend equally ahead and astern, and no two overlap.
+    // The line extends equally ahead and astern, and no two heads overlap.
     assert!(places.iter().sum::<f64>().abs() < 1e-12, "{places:?}");
     let mut sorted = places.clone();
     sorted.sort_by(f64::total_cmp);
     assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] > 0.05), "{sorted:?}");
     assert!(places[0] > 0.0 && places[2] < 0.0, "heads in front must remain in front: {places:?}");
-    // A plan with the other mount gives the same speed as this prediction.
+    // A plan with the heads in line gives the same speed as this prediction.
     let mut there = vita_2(HeadLayout::PhaseShift);
     for ((spec, _), place) in there.heads.iter_mut().zip(&gain.positions_m) {
         spec.mount.position = Vec3::new(place[0], place[1], place[2]);
@@ -301,9 +302,9 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
     assert_eq!(Planner::new(ideal(1)).unwrap().in_line(0.5).unwrap(), None);
 }
 
-/// Heads apart along the hull are in phase only near the speed they were started for.
+/// Heads apart along the hull are in phase only near the speed for which they were started.
 ///
-/// The live advice therefore differs from a plan that may restart them.
+/// The live advice therefore differs from a plan, which may restart the heads.
 #[test]
 fn heads_started_for_another_speed_lower_the_speed() {
     let target_m = 0.6;
@@ -316,7 +317,7 @@ fn heads_started_for_another_speed_lower_the_speed() {
     let held = started(&apart, HELD_SHARE);
     assert!(held > HELD_SHARE && held <= 1.0, "{held}");
     assert!(started(&apart, 0.7) < 0.9, "{}", started(&apart, 0.7));
-    // Without heads apart, only the speed margin makes a difference.
+    // With a single head, the started speed makes no difference.
     let alone = Planner::new(ideal(1)).unwrap();
     let [slow, fast] = [0.3, 0.9].map(|share| started(&alone, share));
     assert!((slow - fast).abs() < 1e-3);
@@ -334,10 +335,11 @@ fn error_names_the_configured_target() {
     assert!(why.to_string().contains("a target of 0.6 m"), "{why}");
 }
 
-/// Heads at one position see the same neighbours as one head. At different positions, minimum and maximum are over
-/// all of them.
+/// Heads at one position see the same neighbours as one head.
+///
+/// For heads at different positions, minimum and maximum are over all heads.
 #[test]
-fn neighbour_distances_cover_all_heads() {
+fn smallest_and_largest_neighbour_distances_are_over_all_heads() {
     let chords_m = |inspection: Inspection| {
         let planner = Planner::new(inspection).unwrap();
         planner.modes().iter().map(|mode| mode.chords_m).collect::<Vec<_>>()
@@ -358,7 +360,9 @@ fn neighbour_distances_cover_all_heads() {
     }
 }
 
-/// At 0.2 rad/s beams move 2.4 m along a wall 6 m away between two passes, but only between the tolerated yaws.
+/// At 0.2 rad/s, beams move 2.4 m along a wall 6 m away between two passes.
+///
+/// The tolerated yaw limits this movement.
 #[test]
 fn swing_is_limited_by_the_tolerated_yaw() {
     let v_mps = |yaw_deg: f64, rate_radps: f64| {

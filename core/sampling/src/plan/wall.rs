@@ -9,20 +9,22 @@ use crate::spacing;
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 
-/// Spacing at a place of the perimeter, at the nominal pose.
+/// Spacing at a place on the wall, with the vehicle at the nominal pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallPlace {
-    /// Its arc length, m.
+    /// Arc length of the place, m.
     pub arc_m: f64,
-    /// Distance between neighbours of one turn on the wall, the largest of the heads that see it, m.
+    /// Largest distance between neighbours of one turn on the wall, m, over the heads that see the place.
     pub t_y_m: f64,
-    /// Distance between passes, m, the smaller and the larger if two alternate; `None` if no head sees it.
+    /// Smaller and larger distance between passes, m; `None` if no head sees the place.
+    ///
+    /// The distances differ where two distances alternate.
     pub t_x_m: Option<[f64; 2]>,
-    /// T from both, m.
+    /// T at the place, m, from `t_y_m` and the larger `t_x_m`; `None` if no head sees the place.
     pub t_m: Option<f64>,
 }
 
-/// A sample of the pattern.
+/// A sample of the planned pattern.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PatternSample {
     /// Number of the head.
@@ -31,14 +33,14 @@ pub struct PatternSample {
     pub x_m: f64,
     /// Arc length, m.
     pub arc_m: f64,
-    /// Whether the vehicle hides it.
+    /// Whether the vehicle hides the sample.
     pub hidden: bool,
-    /// Whether it is the first sample of a head, or the first after a turning point.
+    /// Whether the sample is the first of a head, or the first after a turning point.
     pub new_sweep: bool,
 }
 
 impl Planner {
-    /// Returns the spacing around the perimeter in a mode at a speed, at `places` equidistant places.
+    /// Returns the spacing in a mode at a speed, at `places` equidistant places around the perimeter.
     ///
     /// Errors: a speed that isn't above zero; as for [`Standing::sounding`].
     pub fn perimeter(
@@ -65,7 +67,7 @@ impl Planner {
             let share = around.share.get(k).copied().flatten();
             let t_x_m = gap_s.map(|gap_s| {
                 let longest_m = speed_mps * gap_s;
-                // In a sector two distances alternate; `longest_m` is their sum.
+                // In a sector, two distances alternate, and `longest_m` is their sum.
                 share.map_or([longest_m; 2], |share| layout::divided_m(longest_m, share))
             });
             let t_y_m = around.t_y_m.get(k).copied().unwrap_or(0.0);
@@ -75,7 +77,9 @@ impl Planner {
         Ok((0..places).map(place).collect())
     }
 
-    /// Returns the samples of a number of turns in a mode at a speed, head by head, each in order of time.
+    /// Returns the samples of a number of turns in a mode at a speed.
+    ///
+    /// Samples are sorted by head, then by time.
     ///
     /// Errors: a speed or number of turns that isn't above zero; as for [`Standing::sounding`].
     pub fn pattern(
@@ -113,11 +117,11 @@ impl Planner {
     }
 }
 
-/// Equidistant places around the perimeter, filled head by head.
+/// Equidistant places around the perimeter, with the spacing of the heads added so far.
 struct Around {
     perimeter_m: f64,
     t_y_m: Vec<f64>,
-    /// Position of a place in its head's sector, from 0 to 1.
+    /// Position of each place in the sector of its head, from 0 to 1.
     share: Vec<Option<f64>>,
 }
 
@@ -130,7 +134,7 @@ impl Around {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
-    /// Records a head's step at each place that it crosses and sees.
+    /// Records a head's steps at each place that they cross and the head sees.
     fn add(
         &mut self,
         planner: &Planner,

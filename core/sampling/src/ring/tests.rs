@@ -23,7 +23,9 @@ fn standing(profile: &Profile) -> Standing<'_> {
     Standing::new(profile, &pose(profile, 0.0, 0.0, 0.0), &mount()).unwrap()
 }
 
-/// The reference table: T_max of Eq. 16 for `ceran` at 0.197 m/s, with pings at their actual angles.
+/// The reference table lists T_max of Eq. 16 for `ceran` at 0.197 m/s.
+///
+/// The pings are at their actual angles.
 #[test]
 fn t_max_equals_the_reference_table() {
     let profile = shapes::ceran().unwrap();
@@ -37,7 +39,8 @@ fn t_max_equals_the_reference_table() {
     for (step_deg, turn_s, expected) in modes {
         let turn = Turn::new(f64::to_radians(step_deg), turn_s).unwrap();
         for (heads, expected) in [1.0, 2.0, 4.0].into_iter().zip(expected) {
-            // A quarter turn is 37.5 steps of 2.4 degrees, so every other head meets the corner half a step off.
+            // A quarter turn is 37.5 steps of 2.4 degrees, so every other head's pings are half a step away from the
+            // corner.
             let t_y = (0..4)
                 .map(|head| TAU * (f64::from(head) / heads))
                 .map(|start| Ring::cast(&standing(&profile), start, turn.steps()).unwrap().largest_step_m(1))
@@ -48,7 +51,7 @@ fn t_max_equals_the_reference_table() {
     }
 }
 
-/// The closed forms hold on a flat floor and on a circle to 1e-12 of their values, 7 km into the tunnel.
+/// At chainage 7 km, the closed forms hold on a flat floor and on a circle to 1e-12 of their values.
 #[test]
 fn ray_casting_agrees_with_the_closed_forms() {
     let square = shapes::rectangle(4.0, 4.0).unwrap();
@@ -76,7 +79,7 @@ fn ray_casting_agrees_with_the_closed_forms() {
 }
 
 #[test]
-fn footprint_on_a_flat_wall_and_ahead() {
+fn footprint_on_a_flat_wall_equals_the_closed_form() {
     let square = shapes::rectangle(40.0, 4.0).unwrap();
     let beam = f64::to_radians(2.4);
     for angle_deg in [0.0, 20.0, 60.0, 80.0] {
@@ -90,13 +93,13 @@ fn footprint_on_a_flat_wall_and_ahead() {
 }
 
 #[test]
-fn yaw_lengthens_steps_and_beams_without_a_wall_are_errors() {
+fn yaw_lengthens_steps_and_beam_along_the_tunnel_is_an_error() {
     let profile = shapes::ceran().unwrap();
     let turned = pose(&profile, 0.0, 0.0, f64::to_radians(15.0));
     let head = Standing::new(&profile, &turned, &mount()).unwrap();
     let ring = Ring::cast(&head, 0.0, 400).unwrap();
     assert!(ring.largest_step_m(1) > Ring::cast(&standing(&profile), 0.0, 400).unwrap().largest_step_m(1));
-    // At a yaw of 15 degrees, the beam to the left wall leads ahead or astern by tan(15 degrees) of its range.
+    // At a yaw of 15 degrees, the beam to the left wall is tan(15 degrees) of its lateral range ahead or astern.
     let left = head.sounding(math::FRAC_PI_2).unwrap();
     assert!((left.beam.x() / left.beam.y() + math::tan(f64::to_radians(15.0))).abs() < 1e-12);
 
@@ -113,7 +116,7 @@ fn yaw_lengthens_steps_and_beams_without_a_wall_are_errors() {
 }
 
 #[test]
-fn strided_ring_equals_a_coarser_head_from_every_start() {
+fn strided_ring_has_the_largest_step_of_a_coarser_head_over_all_start_angles() {
     let profile = shapes::ceran().unwrap();
     let fine = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let coarse = |start: u32| {
@@ -128,14 +131,14 @@ fn strided_ring_equals_a_coarser_head_from_every_start() {
 }
 
 #[test]
-fn few_pings_per_turn_leave_most_of_the_wall_between_them() {
+fn step_with_few_pings_per_turn_spans_at_least_half_of_the_perimeter() {
     let profile = shapes::rectangle(20.0, 2.0).unwrap();
     let ring = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let perimeter_m = profile.perimeter_m();
     assert!((ring.largest_step_m(1200) - perimeter_m).abs() < 1e-9);
-    // Two per turn: one of the two steps is at least half of the perimeter.
+    // With two pings per turn, one of the two steps is at least half of the perimeter.
     assert!(ring.largest_step_m(600) >= perimeter_m / 2.0 - 1e-9);
-    // Seen from close to the left wall, a third of a turn spans more than half of the perimeter.
+    // For a head close to the left wall, a third of a turn spans more than half of the perimeter.
     let near = Standing::new(&profile, &pose(&profile, 9.9, 0.0, 0.0), &mount()).unwrap();
     let ring = Ring::cast(&near, 0.0, 1200).unwrap();
     assert!(ring.largest_step_m(400) > 0.8 * perimeter_m, "{}", ring.largest_step_m(400));

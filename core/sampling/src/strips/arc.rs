@@ -10,9 +10,9 @@ use headrace_geometry::math;
 /// An interval of the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Arc {
-    /// Arc length of its start, m.
+    /// Arc length of the start, m.
     pub from_m: f64,
-    /// Its length in the direction of growing arc length, m.
+    /// Length of the interval in the direction of growing arc length, m.
     pub length_m: f64,
 }
 
@@ -39,7 +39,7 @@ impl Arc {
         })
     }
 
-    /// Joins this arc and the next in the head's direction of rotation.
+    /// Joins this arc with the next one in the head's direction of rotation.
     pub(super) fn on_to(&self, next: &Self, forward: bool, perimeter_m: f64) -> Self {
         let (first, last) = if forward { (self, next) } else { (next, self) };
         let length_m = math::wrap(last.from_m + last.length_m - first.from_m, perimeter_m);
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn arc_joins_the_next_one_across_the_seam() {
+    fn joined_arcs_include_the_gap_and_the_seam_between_them() {
         let arc = |from_m: f64, length_m: f64| Arc { from_m, length_m };
         let onward = |a: Arc, b: Arc, forward: bool| {
             let joined = a.on_to(&b, forward, 20.0);

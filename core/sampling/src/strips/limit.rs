@@ -10,23 +10,24 @@ pub struct Going {
     pub ping_period_s: f64,
     /// Largest speed of the beams along the wall due to swing, in addition to the vehicle's speed, m/s.
     pub swing_mps: f64,
-    /// Displacement of passes from their places at any speed, m.
+    /// Displacement of passes along the tunnel from their scheduled places, m, at any speed.
     pub shift_m: f64,
-    /// Distance between heads along the hull, m: the swing acts while the vehicle covers it.
+    /// Distance between heads along the hull, m; the swing acts while the vehicle covers this distance.
     pub apart_m: f64,
-    /// Largest speed of the beams along the wall due to swing, averaged over that time, m/s.
+    /// Mean speed of the beams along the wall due to swing, m/s, while the vehicle covers `apart_m`.
     pub apart_swing_mps: f64,
-    /// Limit of the swing's displacement over any time, m; `None` if unknown.
+    /// Largest displacement of the beams due to swing over any time, m; `None` if unknown.
     pub swing_most_m: Option<f64>,
 }
 
-/// Limit of T: time between passes, and distance between neighbours around the wall.
+/// Inputs of T on a strip: the time between passes, and the distance between neighbours around the wall.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limit {
     pub(super) gap_s: f64,
     pub(super) t_y_m: f64,
-    /// Unevenness across a place that sectors leave out, whose width is `t_y_m`; `None` anywhere else. See
-    /// [`crate::passes::Passes::uneven_ends`].
+    /// Unevenness of passes across a strip that sectors leave out; `None` for any other strip.
+    ///
+    /// The strip's width is `t_y_m`. See [`crate::passes::Passes::uneven_ends`].
     pub(super) uneven: Option<f64>,
 }
 
@@ -41,15 +42,17 @@ impl Limit {
         let advance_m = over_ground_mps * going.ping_period_s;
         let t_m = spacing::t_max_m(t_x_m, advance_m, self.t_y_m);
         let Some(uneven) = self.uneven else { return t_m };
-        // One row may be shifted against the other.
+        // Shift of one row of samples relative to the other.
         t_m.min(staggered_m(t_x_m - going.shift_m + advance_m, self.t_y_m, uneven, going.shift_m))
     }
 
     /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).
     ///
-    /// t is the sum of gap and ping period, w the swing speed, u that between heads, and a their distance. If it is
-    /// faster, the result is instead that with the swing's limit between passes, or that of the circle between two
-    /// rows of turning points.
+    /// t is the sum of gap and ping period, w the swing speed, u the swing speed between heads apart, and a their
+    /// distance.
+    ///
+    /// Two other limits may allow a higher speed, which is then the result: the largest displacement by swing between
+    /// passes, and the circle between two rows of turning points.
     pub(super) fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
         let staggered_m =
@@ -76,12 +79,13 @@ impl Limit {
 
 /// Diameter of the largest circle between two rows of samples, m.
 ///
-/// Samples are `along_m` apart in each row, and rows `across_m`. One row is shifted along by half of `along_m`, by
-/// the share `uneven` of it and by +-`moved_m`, but at most until it is level with the other.
+/// Samples in a row are `along_m` apart, and the rows are `across_m` apart. One row is shifted along the tunnel by
+/// half of `along_m`, by the share `uneven` of it and by +-`moved_m`. The shift ends at most where the rows are
+/// level.
 ///
 /// The circle passes through two samples of a row and the sample of the other row between them, at distances a and b
 /// along the tunnel: 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, with c = `across_m`. If c^2 < a b, its centre is not
-/// between the rows. On a row, its own samples limit the space, and the rows' legs lie beyond.
+/// between the rows. The samples of a row then limit the circle on this row.
 fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let off_m = (uneven * along_m + moved_m).min(along_m / 2.0);
     let square = |x_m: f64| x_m * x_m;
@@ -93,7 +97,7 @@ fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     math::sqrt((a2 + across2) * (b2 + across2)) / across_m
 }
 
-/// Inverse of [`staggered_m`] by `along_m`; at most the target, m.
+/// Inverse of [`staggered_m`] with respect to `along_m`; at most the target, m.
 fn along_staggered_m(target_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let (mut meets_m, mut misses_m) = (0.0, target_m);
     if staggered_m(misses_m, across_m, uneven, moved_m) <= target_m {
@@ -115,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn circles_between_staggered_rows_equal_brute_force() {
+    fn largest_circle_between_staggered_rows_equals_brute_force() {
         for (along_m, across_m) in [(0.5, 0.3), (0.4, 0.4), (0.3, 0.35), (0.5, 0.22), (0.6, 0.1)] {
             for uneven in [0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5] {
                 let samples: Vec<[f64; 2]> = (-4..=4)
@@ -132,7 +136,8 @@ mod tests {
                 let told_m = staggered_m(along_m, across_m, uneven, 0.0);
                 let what = format!("{along_m} {across_m} {uneven}: {widest_m} {told_m}");
                 assert!(widest_m <= told_m + 1e-9, "{what}");
-                // If no circle is centred between the rows, the samples of the other row limit the space on them.
+                // If no circle has its centre between the rows, the samples of the other row limit the space on a
+                // row.
                 let is_between = across_m * across_m >= along_m * along_m * (0.25 - uneven * uneven);
                 assert!(!is_between || widest_m > told_m - 0.005, "{what}");
                 assert!((staggered_m(along_m, across_m, 0.0, uneven * along_m) - told_m).abs() < 1e-12);
@@ -140,13 +145,13 @@ mod tests {
                 assert!((back_m - along_m).abs() < 1e-9, "{what}: {back_m}");
             }
         }
-        // Level rows form the corners of a rectangle.
+        // Samples of level rows form the corners of a rectangle.
         assert!((staggered_m(0.4, 0.3, 0.5, 0.0) - 0.5).abs() < 1e-12);
         assert!((staggered_m(0.4, 0.3, 0.3, 1.0) - 0.5).abs() < 1e-12);
     }
 
     #[test]
-    fn limit_speed_inverts_the_limit_with_swing_and_shift() {
+    fn limit_at_the_limit_speed_equals_the_target_with_swing_and_shift() {
         let bounded = Some(0.3);
         for (swing_mps, shift_m, swing_most_m) in
             [(0.0, 0.0, None), (0.01, 0.0, None), (0.0, 0.03, None), (0.01, 0.03, bounded)]

@@ -1,4 +1,4 @@
-//! Number of passes over each strip that replace one if returns are lost.
+//! Number of passes over each strip that replace a single pass if returns are lost.
 
 use super::Strips;
 use super::thin::Thin;
@@ -6,11 +6,12 @@ use crate::head::{HeadSet, MAX_HEADS};
 use crate::losses::{LossRate, Sampled};
 
 impl Strips {
-    /// Computes the passes over each strip that replace one in a setting, for [`crate::passes::Passes::lossy`].
+    /// Computes the number of passes over each strip that replace a single pass in a setting.
     ///
-    /// `rates` are the losses of each head, `None` for an absent head.
+    /// The number is used with [`crate::passes::Passes::lossy`]. `rates` are the losses of each head, `None` for an
+    /// absent head.
     ///
-    /// Allocates: not with capacity for the settings.
+    /// Allocates: not if the capacity suffices for the settings.
     pub fn count_losses(&mut self, setting: usize, target_m: f64, rates: &[Option<LossRate>; MAX_HEADS]) {
         let first = setting * self.strips.len();
         self.needed.resize(self.steps_m.len(), [1.0; 2]);
@@ -32,7 +33,7 @@ impl Strips {
         }
     }
 
-    /// Returns the passes that replace one within a strip, and across it.
+    /// Returns the number of passes that replace a single pass, within a strip and across it.
     pub(super) fn needed(&self, setting: usize, k: usize, thin: &Thin<'_>) -> [f64; 2] {
         let needed = || self.needed.get(setting * self.strips.len() + k).copied();
         if thin.is_lossy() { needed().unwrap_or([1.0; 2]) } else { [1.0; 2] }

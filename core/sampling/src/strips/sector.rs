@@ -1,4 +1,4 @@
-//! A head's sector on the wall, and the wait of its places between two passes.
+//! A head's sector on the wall, and the longest time between two passes over each place in the sector.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,9 +7,9 @@ use crate::error::SamplingError;
 use crate::occlusion::AngleRange;
 use crate::ring::Standing;
 
-/// Number of equal angles in a sector.
+/// Number of equal angles into which a sector is divided.
 ///
-/// The waits at both ends of one differ by an eighth of a sweep there and back.
+/// The longest times between passes at the two ends of a part differ by an eighth of a sweep there and back.
 pub const PARTS: usize = 8;
 
 /// Wall of a head's sector, in parts of equal angle from one turning point to the other.
@@ -19,7 +19,9 @@ pub struct Sector {
 }
 
 impl Sector {
-    /// Returns the wall that a head sees between two turning points; `angles` are in its sensor frame.
+    /// Returns the wall that a head sees between two turning points.
+    ///
+    /// `angles` are in the sensor frame of the head.
     ///
     /// Errors: as for [`Standing::sounding`].
     pub fn of(standing: &Standing<'_>, angles: &AngleRange) -> Result<Self, SamplingError> {
@@ -32,16 +34,16 @@ impl Sector {
         Ok(Self { parts })
     }
 
-    /// Its parts.
+    /// Parts of the sector.
     pub(super) fn parts(&self) -> impl Iterator<Item = &Arc> {
         self.parts.iter()
     }
 
-    /// Longest wait between two passes over the part with this place, 0.5 to 1.
+    /// Longest time between two passes over the part that contains this place, 0.5 to 1.
     ///
-    /// It is a share of a sweep there and back. `None` outside the sector. At a turning point two passes follow at
-    /// once, and the next one comes a whole sweep later. In the middle, passes are evenly spaced. A circle between
-    /// two legs of the zigzag is at most as wide as their distance at its centre.
+    /// The time is a share of a sweep there and back; `None` outside the sector. At a turning point, one pass follows
+    /// another immediately, and the next comes a whole sweep later. In the middle of the sector, passes are evenly
+    /// spaced. A circle between two legs of the zigzag is at most as wide as the legs' distance at its centre.
     /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
     pub(super) fn wait(&self, arc_m: f64, perimeter_m: f64) -> Option<f64> {
         let number = self.parts.iter().position(|part| part.has(arc_m, perimeter_m))?;

@@ -17,7 +17,7 @@ const GOING: Going = Going {
     swing_most_m: None,
 };
 
-/// A pipe 30 m around; on its axis all steps are equally long.
+/// A pipe with a perimeter of 30 m; seen from its axis, all steps are equally long.
 fn pipe() -> Profile {
     shapes::circle(30.0 / math::TAU).unwrap()
 }
@@ -33,7 +33,7 @@ fn arc(from_m: f64, length_m: f64) -> Arc {
     Arc { from_m, length_m }
 }
 
-/// 2.4 degrees a step: 0.2 m.
+/// A step of 2.4 degrees is 0.2 m long.
 fn strips(views: &[View]) -> Strips {
     let ring = ring(&pipe());
     let mut strips = Strips::default();
@@ -70,7 +70,7 @@ fn full_view_gives_one_strip() {
 }
 
 #[test]
-fn hidden_strip_may_cross_the_seam() {
+fn hidden_strip_across_the_seam_is_one_strip() {
     let some = strips(&[all_around(&[arc(29.0, 2.0)]), all_around(&[])]);
     let widths: Vec<f64> = some.as_slice().iter().map(|strip| strip.arc.length_m).collect();
     assert_eq!(widths, [28.0, 2.0]);
@@ -90,19 +90,19 @@ fn fewer_passes_on_a_hidden_strip_lower_the_speed() {
 }
 
 #[test]
-fn narrow_hidden_strip_counts_as_a_long_step() {
+fn narrow_hidden_strip_counts_like_a_long_step() {
     let some = strips(&[all_around(&[arc(7.0, 0.1)]), all_around(&[])]);
-    // Pings may end one step before it on either side.
+    // Pings may end one step before the hidden strip on either side.
     let v = speed(&some, &turning(2), 0.8).unwrap();
     assert!((v - closed(0.8, 0.5, 4.0)).abs() < 1e-9);
-    // It counts even if it is narrower than the spacing of the ring's soundings.
+    // A strip counts even if it is narrower than the spacing of the ring's soundings.
     let sliver = strips(&[all_around(&[arc(7.0013, 1e-4)])]);
     let v = speed(&sliver, &turning(1), 0.8).unwrap();
     assert!((v - closed(0.8, 0.4001, 8.0)).abs() < 1e-9, "{v}: {sliver:?}");
 }
 
 #[test]
-fn unseen_strip_can_make_every_speed_too_high() {
+fn unseen_strip_as_wide_as_the_target_rules_out_every_speed() {
     let views = [all_around(&[arc(7.0, 0.7)]), all_around(&[arc(7.0, 0.7)])];
     let why = speed(&strips(&views), &turning(2), 0.5).unwrap_err();
     assert!(
@@ -119,7 +119,7 @@ fn unseen_strip_can_make_every_speed_too_high() {
 }
 
 #[test]
-fn gap_between_sectors_is_noticed_and_pinged_to_its_edges() {
+fn gap_between_sectors_is_an_unseen_strip_that_limits_the_speed() {
     let views = [
         View { sector: Some(Sector::evenly(arc(0.2, 14.8))), hidden: Vec::new() },
         View { sector: Some(Sector::evenly(arc(15.0, 14.9))), hidden: Vec::new() },
@@ -128,8 +128,8 @@ fn gap_between_sectors_is_noticed_and_pinged_to_its_edges() {
     let some = strips(&views);
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
     assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);
-    // For a large target, the end of a sector is the limit. Otherwise the circle through three samples is: two on one
-    // side, 8 s apart, and the third between them on the other side.
+    // For a large target, the end of a sector is the limit. For a small target, the limit is the circle through three
+    // samples: two on one side of the gap, 8 s apart, and one between them on the other side.
     let v = speed(&some, &passes, 1.0).unwrap();
     assert!((v - closed(1.0, 0.2, 8.0)).abs() < 1e-9);
     let v = speed(&some, &passes, 0.35).unwrap();
@@ -145,26 +145,29 @@ fn hidden_arc_outside_a_sector_has_no_effect() {
         hidden: Vec::new(),
     };
     let open = [plain(0.0, 14.99), plain(15.0, 15.0)];
-    // A narrow strip that both leave out, and wall of the other's sector.
+    // The arc covers a narrow strip that both sectors leave out, and wall of the other head's sector.
     let mut beside = open.clone();
     beside[0].hidden = vec![arc(14.992, 5.0)];
     let passes = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
     let speeds = [&open, &beside].map(|views| speed(&strips(views), &passes, 0.5).unwrap());
     assert!((speeds[0] - speeds[1]).abs() < 1e-12, "{speeds:?}");
-    // Within its own sector it does.
+    // A hidden arc within the head's own sector has an effect.
     let mut own = open.clone();
     own[0].hidden = vec![arc(7.0, 0.4)];
     assert!(speed(&strips(&own), &passes, 0.5).is_err());
 }
 
-/// Comparison with the samples of two heads in the middle of a rectangle, whose corners lie within their sectors.
+/// The reference is the set of samples of two heads in the middle of a rectangle.
+///
+/// The rectangle's corners lie within the heads' sectors.
 #[test]
-fn long_step_in_a_sector_counts_with_its_local_wait() {
+fn long_step_in_a_sector_counts_with_the_local_time_between_passes() {
     let (target_m, sweep_s, count) = (0.5, 8.0, 75);
     let profile = shapes::rectangle(6.0, 4.0).unwrap();
     let ring = ring(&profile);
     let perimeter_m = profile.perimeter_m();
-    // The first head sweeps from the floor's centre up the left side to the roof's, the other down the right side.
+    // The first head sweeps up the left side from the floor's centre to the roof's centre. The second head sweeps
+    // down the right side.
     let half = perimeter_m / 2.0;
     let views = [0.0, half].map(|from_m| {
         let [y, z] = profile.reference();
@@ -211,8 +214,8 @@ fn long_step_in_a_sector_counts_with_its_local_wait() {
 }
 
 #[test]
-fn steps_count_on_their_own_strip() {
-    // Steps of a rectangle are long in its corners; a strip in the middle of the floor has none of them.
+fn steps_count_only_on_strips_that_they_touch() {
+    // Steps of a rectangle are long in its corners. A strip in the middle of the floor has no long steps.
     let profile = shapes::rectangle(8.0, 4.0).unwrap();
     let ring = ring(&profile);
     let mut some = Strips::default();
@@ -232,7 +235,7 @@ fn swing_and_shift_widen_the_distance_between_passes() {
     assert!(v < speed(&one, &turning(1), 0.5).unwrap() - 0.01);
     let worse = Going { swing_mps: 0.1, apart_swing_mps: 0.1, ..rough };
     assert!(one.bound_for_target(0, &turning(1), 0.5, &worse).is_err());
-    // A bounded swing allows a higher speed.
+    // A swing of bounded extent allows a higher speed.
     let to_and_fro = Going { swing_most_m: Some(0.1), ..worse };
     let v = one.bound_for_target(0, &turning(1), 0.5, &to_and_fro).unwrap().speed_mps;
     assert!((one.t_max_m(0, &turning(1), v, &to_and_fro) - 0.5).abs() < 1e-12);
@@ -249,7 +252,7 @@ fn wall_out_of_reach_is_hidden() {
         view.hidden
     };
     assert!(hidden([0.1, 5.0]).is_empty());
-    // The four corners are 4.5 m away, the end walls 4 m.
+    // The distances of the four corners are 4.5 m, and those of the end walls 4 m.
     let corners = hidden([0.1, 4.2]);
     assert_eq!(corners.len(), 4);
     let far_m: f64 = corners.iter().map(|arc| arc.length_m).sum();
@@ -260,7 +263,7 @@ fn wall_out_of_reach_is_hidden() {
 }
 
 #[test]
-fn strip_across_the_seam_is_one() {
+fn overlapping_hidden_arcs_across_the_seam_form_one_strip() {
     let mut some = Strips::default();
     some.rebuild(10.0, &[all_around(&[arc(8.0, 4.0), arc(1.0, 2.0)])]);
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
@@ -272,8 +275,8 @@ fn strip_across_the_seam_is_one() {
 }
 
 #[test]
-fn full_capacity_hides_more_wall_never_less() {
-    // Slots all around are out of reach, and two views have too little capacity for them.
+fn full_capacity_hides_more_wall_and_never_less() {
+    // Slots all around the profile are out of reach. One of the two views has too little capacity for the slots.
     let points: Vec<[f64; 2]> = (0..240)
         .map(|k| {
             let (sine, cosine) = math::sin_cos(math::TAU * (f64::from(k) + 0.3) / 240.0);
@@ -299,7 +302,7 @@ fn full_capacity_hides_more_wall_never_less() {
     }
 }
 
-/// In both directions of rotation: before its end it is the same strip, after it another one, even across the seam.
+/// In either direction of rotation, the strip changes at this distance, even across the seam.
 #[test]
 fn each_sounding_has_the_distance_to_its_strip_end() {
     let mut strips = strips(&[all_around(&[arc(4.0, 3.0), arc(28.0, 3.5)]), all_around(&[arc(10.0, 5.0)])]);

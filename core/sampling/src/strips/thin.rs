@@ -3,24 +3,28 @@
 use crate::head::HeadSet;
 use crate::passes::Passes;
 
-/// Number of head sets whose gaps are kept; strips hidden from one or two heads rarely make more.
+/// Number of head sets whose gaps are stored.
+///
+/// Strips hidden from one or two heads rarely have more different head sets.
 const SETS: usize = 8;
-/// Number of strips whose head set is cached; others are looked up again.
+/// Number of strips whose head set is cached; the gaps of other strips are computed again.
 const STRIPS: usize = 64;
-/// Number of a set that is not kept.
+/// Number that stands for a head set that is not stored.
 const NOT_KEPT: u8 = u8::MAX;
 
-/// Time between passes over each strip, and which strips are thin: passed less often than the best one.
+/// Time between passes over each strip, and the thin strips.
+///
+/// A thin strip is passed less often than the strip that is passed most often.
 pub(super) struct Thin<'a> {
     passes: &'a Passes,
-    /// Head sets with their gaps, s; many strips are seen by the same heads.
+    /// Head sets and their gaps, s; many strips are seen by the same heads.
     sets: [(HeadSet, Option<f64>); SETS],
     set_of: [u8; STRIPS],
     best_s: f64,
 }
 
 impl<'a> Thin<'a> {
-    /// Creates it for strips given by the heads that see them.
+    /// Creates the detection for strips; `strips` lists the heads that see each strip.
     pub(super) fn of(passes: &'a Passes, strips: impl Iterator<Item = HeadSet>) -> Self {
         let mut thin = Self {
             passes,
@@ -53,12 +57,12 @@ impl<'a> Thin<'a> {
         thin
     }
 
-    /// Time between passes over the strip that is passed most often, s; infinite if none is.
+    /// Time between passes over the strip that is passed most often, s; infinite if no strip is passed.
     pub(super) fn best_s(&self) -> f64 {
         self.best_s
     }
 
-    /// Time between passes over a strip, by its number, s; `None` if no head sees it.
+    /// Time between passes over the strip `k`, s; `None` if no head sees the strip.
     pub(super) fn gap_s(&self, k: usize, seen_by: HeadSet) -> Option<f64> {
         let kept = self.set_of.get(k).and_then(|number| self.sets.get(usize::from(*number)));
         kept.map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| *gap_s)
@@ -69,17 +73,17 @@ impl<'a> Thin<'a> {
         if needed > 1.0 { self.passes.time_for_s(seen_by, gap_s, needed) } else { gap_s }
     }
 
-    /// See [`Passes::uneven_ends`].
+    /// Unevenness at shared ends, as in [`Passes::uneven_ends`].
     pub(super) fn uneven_ends(&self) -> Option<f64> {
         self.passes.uneven_ends()
     }
 
-    /// Whether lost returns count.
+    /// Whether extra passes are required for lost returns.
     pub(super) fn is_lossy(&self) -> bool {
         self.passes.is_lossy()
     }
 
-    /// Whether a strip is passed as often as the best one.
+    /// Whether a strip is passed as often as the strip that is passed most often.
     pub(super) fn is_full(&self, k: usize, seen_by: HeadSet) -> bool {
         self.gap_s(k, seen_by).is_some_and(|gap_s| gap_s <= self.best_s)
     }

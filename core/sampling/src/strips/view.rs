@@ -9,9 +9,9 @@ use headrace_geometry::snapshot::stateful;
 /// The parts of the wall that one head sees.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct View {
-    /// Its sector; `None` for the whole perimeter.
+    /// Sector of the head; `None` for the whole perimeter.
     pub sector: Option<Sector>,
-    /// Arcs hidden from it, by the vehicle or out of its reach.
+    /// Arcs of the wall that the vehicle hides from the head, or that are out of the head's reach.
     pub hidden: Vec<Arc>,
 }
 
@@ -20,10 +20,10 @@ stateful!(View { state: sector; lists: hidden; });
 impl View {
     /// Hides the parts of a ring nearer or farther than the head's reach.
     ///
-    /// Without capacity for another arc, it extends the last one over the visible part in between: hiding too much is
-    /// the safe side.
+    /// Without capacity for another arc, the function extends the last arc over the visible part in between. Hiding
+    /// too much wall is the safe error.
     ///
-    /// Allocates: not with capacity for one arc.
+    /// Allocates: not if the capacity suffices for one arc.
     pub fn hide_out_of_reach(&mut self, ring: &Ring, reach_m: [f64; 2]) {
         let [least_m, most_m] = reach_m;
         let heard = |range_m: f64| (least_m..=most_m).contains(&range_m);

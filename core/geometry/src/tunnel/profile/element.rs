@@ -1,29 +1,31 @@
-//! One piece of a profile in its place: ray crossings and arc lengths on it.
+//! One piece of a profile at its position on the curve: ray crossings and arc lengths on the piece.
 
 use super::plane::{Yz, cross, dot, norm, sub};
 use crate::math::{self, TAU};
 
-/// Angle by which a hit may lie beyond an arc's end, rad, so that neighbours leave no gap.
+/// Angle by which a hit may lie beyond an arc's end, rad, so that neighbouring elements leave no gap.
 pub(super) const ARC_SLACK_RAD: f64 = 1e-12;
 /// Margin beyond which a hit is clearly inside or outside an arc.
 ///
-/// It is the difference between the cosine about the arc's middle and that of the ends, and far exceeds slack plus
-/// rounding.
+/// The margin applies to the cosine of the angle about the arc's middle, less that of the arc's ends. It is far
+/// larger than slack plus rounding.
 const CLEAR: f64 = 1e-9;
 
-/// Sine of the angle to a ray below which an edge counts as parallel to it.
+/// Sine of the angle between an edge and a ray below which they count as parallel.
 const PARALLEL: f64 = 1e-6;
 
 /// One input piece of a profile; pieces run counter-clockwise with y to the right and z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
-    /// A straight line to this point.
+    /// A straight line to the given point.
     LineTo(Yz),
-    /// An arc about `centre` through `sweep_rad` > 0 (polar angle grows, so that it bulges outwards).
+    /// An arc about `centre` through `sweep_rad` > 0.
+    ///
+    /// The polar angle grows, so the arc bulges outwards.
     Arc {
-        /// Centre of its circle.
+        /// Centre of the arc's circle.
         centre: Yz,
-        /// Angle turned about the centre.
+        /// Angle from the arc's start to its end, about the centre.
         sweep_rad: f64,
     },
 }
@@ -40,7 +42,7 @@ pub(super) struct Element {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Shape {
     Line,
-    /// `middle` is the unit vector to the arc's middle, `cos_half` the cosine of half its sweep.
+    /// `middle` is the unit vector to the arc's middle, `cos_half` the cosine of half the sweep.
     Arc {
         centre: Yz,
         radius_m: f64,
@@ -52,13 +54,14 @@ pub(super) enum Shape {
 }
 
 impl Element {
-    /// Ray parameter where the ray leaves the profile through this element.
+    /// Returns the ray parameter at which the ray leaves the profile through this element.
     pub(super) fn crossing(&self, origin: Yz, direction: Yz) -> Option<f64> {
         let (start, end) = (sub(self.start, origin), sub(self.end, origin));
         match self.shape {
             Shape::Line => {
-                // A ray leaves with the start on its right and the end on its left. The half-open test uses the same
-                // product for the vertex shared by two elements, so that exactly one of them is hit.
+                // A ray leaves the profile if the element's start is on the ray's right and the end is on its left.
+                // The half-open test uses the same product for the vertex shared by two elements, so that exactly one
+                // of the two elements is hit.
                 let (right, left) = (cross(direction, start), cross(direction, end));
                 if !(right <= 0.0 && left > 0.0) {
                     return None;
@@ -66,8 +69,7 @@ impl Element {
                 let (along, apart) = (sub(self.end, self.start), left - right);
                 let t = cross(start, along) / apart;
                 let length2 = dot(direction, direction);
-                // For a ray along the edge, both products are rounding errors: it leaves somewhere on the edge, and
-                // nowhere else.
+                // For a ray along the edge, both products are rounding errors. The exit is then limited to the edge.
                 let t = if apart * apart < PARALLEL * PARALLEL * length2 * dot(along, along) {
                     let ends = [dot(start, direction) / length2, dot(end, direction) / length2];
                     t.clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
@@ -109,7 +111,7 @@ impl Element {
             Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
                 let from_centre = sub(point, centre);
                 let turned = math::wrap(math::atan2(from_centre[1], from_centre[0]) - from_rad, TAU);
-                // Just past the end means slightly before the start.
+                // A point just past the end counts as slightly before the start.
                 let turned = if turned > sweep_rad + ARC_SLACK_RAD { 0.0 } else { turned };
                 radius_m * turned
             }
@@ -142,7 +144,7 @@ impl Element {
         [-outwards[0] / length, -outwards[1] / length]
     }
 
-    /// Returns the angle that this element spans about `reference`; `None` if it runs backwards anywhere.
+    /// Returns the angle that this element spans about `reference`; `None` if any part of it runs backwards.
     pub(super) fn angle_about(&self, reference: Yz) -> Option<f64> {
         let (start, end) = (sub(self.start, reference), sub(self.end, reference));
         match self.shape {
@@ -151,7 +153,8 @@ impl Element {
                 (angle > 0.0).then_some(angle)
             }
             Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
-                // On the arc, forwards means (centre - reference) . e(theta) + radius > 0; checked at 256 steps.
+                // The arc runs forwards where (centre - reference) . e(theta) + radius > 0. The condition is checked
+                // at 256 steps.
                 let shift = sub(centre, reference);
                 let steps = 256;
                 let mut angle = 0.0;

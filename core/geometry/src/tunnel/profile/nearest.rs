@@ -20,9 +20,9 @@ pub struct Nearest {
 impl Profile {
     /// Returns the point of the wall nearest to `point`, from inside or outside; exact for lines and arcs.
     ///
-    /// Among equally near points, it is the first in order of arc length.
+    /// Among equally near points, the result is the first in order of arc length.
     ///
-    /// Allocates: no.
+    /// Allocates: never.
     pub fn nearest(&self, point: Yz) -> Nearest {
         let mut best = (f64::INFINITY, 0, self.reference);
         let distance = |bounds: &Bounds| bounds.distance_m(point);
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::tunnel::shapes;
 
-    /// Smallest distance to wall points 0.5 mm apart, which exceeds the true one by less than 0.25 mm.
+    /// Smallest distance to wall points 0.5 mm apart, which exceeds the true distance by less than 0.25 mm.
     fn by_places(profile: &Profile, point: Yz) -> f64 {
         let places = math::round_to_i64(profile.perimeter_m() / 5e-4);
         (0..places).map(|k| norm(sub(point, profile.point_at(k as f64 * 5e-4)))).fold(f64::INFINITY, f64::min)
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn centre_of_an_arc_is_one_radius_away() {
+    fn distance_from_the_centre_of_a_circle_is_its_radius() {
         let profile = shapes::circle(2.0).unwrap();
         assert!((profile.nearest([0.0, 2.0]).distance_m - 2.0).abs() < 1e-12);
     }

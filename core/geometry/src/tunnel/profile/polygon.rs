@@ -9,7 +9,7 @@ impl Profile {
     ///
     /// Arc length begins at the lowest crossing of y = 0. `reference` defaults to the polygon's centroid.
     ///
-    /// Errors: see [`ProfileError`], whose vertices are indices into `points`.
+    /// Errors: see [`ProfileError`]; its vertices are indices into `points`.
     /// Allocates: startup only.
     pub fn polygon(points: &[Yz], reference: Option<Yz>) -> Result<Self, ProfileError> {
         if let Some(vertex) = points.iter().position(|p| !p.iter().all(|c| c.abs() <= 1000.0)) {
@@ -25,12 +25,12 @@ impl Profile {
         }
         let (edge, start) = floor_centre(&ring).ok_or(ProfileError::BesideMiddle)?;
         let count = ring.len();
-        // Starts at the edge that crosses y = 0.
+        // The curve starts on the edge that crosses y = 0.
         let vertex = |k: usize| ring.get((edge + k) % count);
         let pieces: Vec<Piece> = (1..=count).filter_map(vertex).map(|v| Piece::LineTo(v.point)).collect();
         Self::new(start, &pieces, reference.unwrap_or(centroid)).map_err(|error| match error {
             ProfileError::NotStarShaped { vertex: piece, reference } => {
-                // A piece begins where the previous one ends; the first one begins within the edge that crosses y =
+                // A piece begins where the previous one ends. The first piece begins within the edge that crosses y =
                 // 0.
                 let index = vertex(piece).map_or(0, |begin| begin.index);
                 ProfileError::NotStarShaped { vertex: index, reference }
@@ -47,7 +47,7 @@ struct Vertex {
     point: Yz,
 }
 
-/// Removes points that repeat their predecessor; the predecessor of the first is the last.
+/// Removes points that repeat their predecessor; the predecessor of the first point is the last point.
 fn distinct(points: &[Yz]) -> Vec<Vertex> {
     let mut ring: Vec<Vertex> = Vec::with_capacity(points.len());
     for (index, point) in points.iter().copied().enumerate() {
@@ -87,7 +87,9 @@ fn area_and_centroid(ring: &[Vertex]) -> (f64, Yz) {
     (area2 / 2.0, centroid)
 }
 
-/// Finds the lowest crossing of y = 0: index of the edge's first point, and the crossing.
+/// Finds the lowest crossing of y = 0.
+///
+/// Returns the index of the first point of the edge, and the crossing.
 fn floor_centre(ring: &[Vertex]) -> Option<(usize, Yz)> {
     let crossing = |(index, (a, b)): (usize, (Yz, Yz))| {
         if (a[0] <= 0.0) == (b[0] <= 0.0) {

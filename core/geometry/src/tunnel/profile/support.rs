@@ -1,4 +1,4 @@
-//! Extent of a profile with many elements in a direction: bounds from a table.
+//! Extent of a profile with many elements in any direction, bounded by a table.
 
 use super::plane::{Yz, dot, norm};
 use crate::math::{self, TAU};
@@ -8,8 +8,8 @@ const DIRECTIONS: usize = 128;
 
 /// Extent of the points in each direction of the table, m.
 ///
-/// A direction between two entries is bounded by both from above. The excess is at most half the longest edge of the
-/// points' hull times tan(pi / [`DIRECTIONS`]), 0.025: 12 mm for each metre of a flat wall.
+/// Between two directions of the table, their two entries give an upper bound. The bound is too large by at most half
+/// the longest edge of the points' hull times tan(pi / [`DIRECTIONS`]), 0.025: 12 mm for each metre of a flat wall.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Support(Vec<(Yz, f64)>);
 
@@ -25,7 +25,7 @@ impl Support {
         Self((0..DIRECTIONS).map(reach).collect())
     }
 
-    /// Upper bound of the distance from `origin` to the farthest point, m; at most 0.03 % above it.
+    /// Upper bound of the distance from `origin` to the farthest point, m; at most 0.03 % too large.
     pub(super) fn farthest_m(&self, origin: Yz) -> f64 {
         let reaches = self.0.iter().map(|(direction, reach_m)| reach_m - dot(origin, *direction));
         reaches.fold(0.0, f64::max) / math::cos(TAU / 2.0 / DIRECTIONS as f64)

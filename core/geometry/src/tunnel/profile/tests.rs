@@ -12,15 +12,15 @@ fn polygon(radii: &[f64]) -> Profile {
     Profile::polygon(&points.collect::<Vec<_>>(), Some([0.0, 3.0])).unwrap()
 }
 
-/// The same curve without a tree.
+/// Returns the same curve without a tree.
 fn plain(profile: &Profile) -> Profile {
     Profile { tree: Tree::default(), support: None, ..profile.clone() }
 }
 
 proptest! {
-    /// A profile with a tree gives bit-identical answers to one without, even for rays through vertices.
+    /// The answers with a tree are bit-identical to those without, even for rays through vertices.
     #[test]
-    fn tree_gives_the_same_answers(
+    fn profile_with_a_tree_gives_the_same_answers_as_without(
         radii in prop::collection::vec(1.8..2.2_f64, 25..400),
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
@@ -47,17 +47,18 @@ proptest! {
 proptest! {
     /// The bounds of the table hold, and their excess follows from geometry.
     ///
-    /// The farthest point is at most half a step away from a direction of the table. Tangents in two neighbouring
-    /// directions meet above the edge between their points, by at most half that edge times the tangent of half a
-    /// step. The longest edge of the hull here is a chord of 2.2 m that passes 1.8 m from the centre.
+    /// The farthest point is at most half a step away from a direction of the table. The tangents in two neighbouring
+    /// directions meet beyond the edge between their points. They meet at most half the edge's length times the
+    /// tangent of half a step away from it. The longest edge of the hull in this test is a chord that passes 1.8 m
+    /// from the centre, with its ends at 2.2 m.
     #[test]
-    fn table_bounds_are_tight(
+    fn excess_of_table_bounds_is_limited_by_geometry(
         radii in prop::collection::vec(prop_oneof![9 => 1.8..2.2_f64, 1 => Just(1.8)], 257..600),
         level in prop::option::of(0usize..32),
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
     ) {
-        // Few of many points stand out, which makes the hull's edges long.
+        // Only a few of many points stand out, so the hull's edges are long.
         let radii: Vec<f64> = match level {
             Some(of_32) => radii.iter().enumerate().map(|(k, r)| if k % 32 == of_32 { *r } else { 1.8 }).collect(),
             None => radii,
@@ -80,15 +81,14 @@ proptest! {
     }
 }
 
-/// The centre of a regular polygon is equally far from all edges: the first along the wall is nearest, with or
-/// without a tree.
+/// The centre of a regular polygon is equally far from all edges.
 #[test]
-fn first_of_equally_near_elements_is_nearest() {
+fn first_of_equally_near_elements_is_the_result() {
     let tree = polygon(&[2.0; 96]);
     assert_eq!(tree.nearest([0.0, 3.0]), plain(&tree).nearest([0.0, 3.0]));
 }
 
-/// A survey with 100,000 points: each query visits few of them. The visits are counted, not timed.
+/// Few of the 100,000 elements are visited per query. The test counts the visits and measures no time.
 #[test]
 fn query_visits_few_of_many_elements() {
     let radii: Vec<f64> = (0..100_000).map(|k| 2.0 + 0.01 * math::sin(f64::from(k) * 0.37)).collect();
@@ -116,7 +116,7 @@ fn query_visits_few_of_many_elements() {
 
 #[test]
 fn rejected_polygon_names_the_input_point() {
-    // A hook on the left wall with edges that run backwards after the fourth point, in any numbering of the points.
+    // The left wall has a hook whose edges run backwards after the fourth point, in any numbering of the points.
     let hooked = [[3.0, 0.0], [3.0, 4.0], [2.9, 4.0], [2.9, 0.5], [-3.0, 0.5], [-3.0, 0.0]];
     let refused = |points: &[Yz]| match Profile::polygon(points, Some([0.0, 0.2])) {
         Err(ProfileError::NotStarShaped { vertex, .. }) => {
@@ -128,17 +128,17 @@ fn rejected_polygon_names_the_input_point() {
         let mut turned = hooked;
         turned.rotate_left(first);
         assert_eq!(refused(&turned), 2, "from {first}");
-        // Repeated points count in the file's numbering.
+        // With repeated points, the error still refers to the numbering of the input.
         let repeated: Vec<Yz> = turned.iter().flat_map(|point| [*point, *point]).collect();
         assert_eq!(refused(&repeated), 2, "from {first}");
-        // In the opposite sense the same edge begins at its other end.
+        // In the opposite sense of rotation, the edge begins at its other end.
         turned.reverse();
         assert!([2, 3].contains(&refused(&turned)), "from {first}");
     }
 }
 
 #[test]
-fn polygon_beside_y_0_is_rejected() {
+fn polygon_on_one_side_of_y_0_is_rejected() {
     let beside = [[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0]];
     assert_eq!(Profile::polygon(&beside, None), Err(ProfileError::BesideMiddle));
 }

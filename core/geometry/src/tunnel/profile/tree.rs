@@ -1,15 +1,16 @@
 //! Tree of boxes over a profile's elements, for queries in logarithmic time.
 //!
-//! It skips only elements that cannot affect the result, so results are bit-identical to a search of all elements.
+//! A search skips only elements that cannot affect the result, so results are bit-identical to those of a full
+//! search.
 
 use super::element::{Element, Shape};
 use super::plane::{Yz, norm};
 
 /// Number of elements in a leaf; neighbours along the wall are close together.
 const LEAF: usize = 8;
-/// Maximum number of elements without a tree, since a search of all is as fast.
+/// Maximum number of elements without a tree; a full search of so few elements is as fast.
 const FEW: usize = 24;
-/// Margin of the boxes around their elements, m: far larger than rounding and an arc's slack.
+/// Margin of the boxes around their elements, m, far larger than rounding errors and an arc's slack.
 const MARGIN_M: f64 = 1e-6;
 /// Depth of a tree over the maximum number of elements.
 const DEPTH: usize = 40;
@@ -21,9 +22,10 @@ pub(super) struct Bounds {
     high: Yz,
 }
 
-/// The boxes: node 1 contains all, and nodes 2 i and 2 i + 1 the halves of node i.
+/// The boxes of the tree.
 ///
-/// `leaves` of them are leaves. Empty for few elements.
+/// Node 1 contains all elements, and nodes 2 i and 2 i + 1 contain the halves of node i. `leaves` is the number of
+/// leaves. The tree is empty for few elements.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Tree {
     nodes: Vec<Bounds>,
@@ -33,7 +35,7 @@ pub(super) struct Tree {
 impl Bounds {
     const EMPTY: Self = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
 
-    /// An arc gets the box of its whole circle, which is larger but simple.
+    /// The box of an arc contains its whole circle, which is larger but simpler.
     fn of(element: &Element) -> Self {
         let Element { start, end, .. } = *element;
         let of = |place: fn(f64, f64) -> f64, off: f64| {
@@ -50,7 +52,7 @@ impl Bounds {
         Self { low: each(f64::min, self.low, other.low), high: each(f64::max, self.high, other.high) }
     }
 
-    /// Ray parameter where the ray enters, zero from inside; infinite where it misses.
+    /// Ray parameter at which the ray enters the box: zero from inside, infinite if the ray misses the box.
     pub(super) fn entry(&self, origin: Yz, direction: Yz) -> f64 {
         let (mut from, mut to) = (0.0, f64::INFINITY);
         for (((low, high), at), along) in self.low.iter().zip(&self.high).zip(origin).zip(direction) {
@@ -67,7 +69,7 @@ impl Bounds {
         if from <= to { from } else { f64::INFINITY }
     }
 
-    /// Returns the distance of a point, m; zero inside.
+    /// Returns the distance from a point to the box, m; zero inside.
     pub(super) fn distance_m(&self, point: Yz) -> f64 {
         let off = |axis: usize| {
             let (low, high, at) = (self.low[axis], self.high[axis], point[axis]);
@@ -99,8 +101,8 @@ impl Tree {
 
     /// Visits ranges of elements, by index, that may improve on the best result so far.
     ///
-    /// `bound` is the minimum cost of anything in a box; `look` returns the best cost found so far. Elements of equal
-    /// cost are all visited.
+    /// `bound` returns the minimum cost of any element in a box. `look` returns the best cost found so far. Elements
+    /// of equal cost are all visited.
     pub(super) fn search(
         &self,
         count: usize,

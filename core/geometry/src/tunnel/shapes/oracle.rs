@@ -1,4 +1,6 @@
-//! Hard rays compared with 50-digit values: `tests/oracles/geometry.py` made `geometry.csv` with mpmath.
+//! Comparison of difficult rays with 50-digit values.
+//!
+//! `tests/oracles/geometry.py` computes the values in `geometry.csv` with mpmath.
 
 use super::*;
 use crate::tunnel::{Piece, Yz};
@@ -31,15 +33,15 @@ fn worst(case: &str) -> (f64, f64, u32) {
 }
 
 #[test]
-fn rays_from_1_mm_off_the_wall() {
+fn rays_from_1_mm_off_the_wall_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("millimetre");
     assert_eq!(count, 144);
     found("geometry.millimetre", range_m.max(arc_m), 1e-13);
 }
 
-/// At 89.99 degrees to the wall, a step across it is 5,730 steps along it.
+/// At 89.99 degrees to the normal, an error across the wall is multiplied by 5,730 along the wall.
 #[test]
-fn rays_nearly_along_the_wall() {
+fn rays_nearly_along_the_wall_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("grazing");
     assert_eq!(count, 144);
     let condition = 1.0 / math::cos(f64::to_radians(89.99));
@@ -47,7 +49,7 @@ fn rays_nearly_along_the_wall() {
 }
 
 #[test]
-fn rays_through_corners_and_an_ulp_beside() {
+fn rays_through_and_an_ulp_beside_corners_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("corner");
     assert_eq!(count, 36);
     found("geometry.corner", range_m.max(arc_m), 1e-14);
@@ -55,27 +57,27 @@ fn rays_through_corners_and_an_ulp_beside() {
 
 /// The value under the root is 0 or a few ulps.
 ///
-/// An error of one ulp there is an error of its square root.
+/// An error of one ulp in this value is an error of sqrt(ulp) in the result.
 #[test]
-fn rays_tangent_to_the_vault() {
+fn rays_tangent_to_the_vault_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("tangent");
     assert_eq!(count, 56);
     found_at("geometry.tangent", 1.0 / math::sqrt(f64::EPSILON), range_m.max(arc_m), 1e-7);
 }
 
-/// A rotated square with round corners, whose walls run into arcs without a corner.
+/// The profile is a rotated square with rounded corners, so its walls run into arcs tangentially.
 ///
-/// Rounding puts a ray along a wall slightly inside or outside the arcs' circles, so the value under the root has
-/// either sign.
+/// Rounding puts a ray along a wall slightly inside or outside the arcs' circles. The value under the root can thus
+/// have either sign.
 #[test]
-fn rays_along_walls_end_at_the_wall_end() {
+fn rays_along_walls_end_at_the_end_of_the_wall() {
     let (half, radius) = (2.0, 0.5);
     let (mut worst_m, mut negative, mut positive) = (0.0_f64, 0, 0);
     for turn in 0..400 {
         let (sin, cos) = math::sin_cos(0.5 + f64::from(turn) * 1e-3);
         let turned = |[y, z]: Yz| [y * cos - z * sin, 3.0 + y * sin + z * cos];
         let inner = half - radius;
-        // Counter-clockwise from the middle of the lower wall.
+        // The pieces run counter-clockwise from the middle of the lower wall.
         let corners = [[inner, -inner], [inner, inner], [-inner, inner], [-inner, -inner]];
         let lines = [[inner, -half], [half, inner], [-inner, half], [-half, -inner]];
         let mut pieces = Vec::new();
@@ -87,7 +89,7 @@ fn rays_along_walls_end_at_the_wall_end() {
         for side in [[half, 0.0, 0.0, 1.0], [0.0, half, -1.0, 0.0], [-half, 0.0, 0.0, -1.0]] {
             let [y, z, v, w] = side;
             let (origin, direction) = (turned([y, z]), [v * cos - w * sin, v * sin + w * cos]);
-            // End of the wall and start of the arc, and the arc's centre.
+            // The wall's end, where the arc starts, and the arc's centre.
             let end = turned([y + inner * v, z + inner * w]);
             let centre = turned([
                 y + inner * v - radius * w.abs() * y.signum(),
@@ -106,7 +108,7 @@ fn rays_along_walls_end_at_the_wall_end() {
             let hit = profile
                 .cast_from_inside(origin, direction)
                 .unwrap_or_else(|| panic!("no wall at turn {turn}"));
-            // Because of rounding, the ray may meet the wall that it runs along. Beyond the wall's end there is only
+            // Because of rounding, the ray may meet the wall along which it runs. Beyond the wall's end there is only
             // the arc.
             let off = [hit.point[0] - end[0], hit.point[1] - end[1]];
             let beyond_m = off[0] * direction[0] + off[1] * direction[1];

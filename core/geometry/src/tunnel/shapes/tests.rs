@@ -23,7 +23,7 @@ fn all() -> Vec<(&'static str, Profile)> {
     ]
 }
 
-/// Dimensions of the paper's tunnel, derived from its figures.
+/// The expected values are derived from the paper's figures.
 #[test]
 fn ceran_has_the_dimensions_of_the_errata() {
     let ceran = ceran().unwrap();
@@ -35,7 +35,7 @@ fn ceran_has_the_dimensions_of_the_errata() {
 }
 
 #[test]
-fn arc_length_starts_at_the_floor_centre_and_grows_with_the_head_angle() {
+fn arc_length_grows_with_the_head_angle_from_the_floor_centre() {
     for (name, profile) in all() {
         let mut last = -1.0;
         for degree in 0..360 {
@@ -50,7 +50,7 @@ fn arc_length_starts_at_the_floor_centre_and_grows_with_the_head_angle() {
     }
 }
 
-/// A dense polyline of the same curve is inscribed in its arcs, so its ranges approach the exact ones from inside.
+/// A dense polyline of the same curve is inscribed in its arcs, so its ranges are slightly too short.
 #[test]
 fn ranges_agree_with_a_dense_polyline() {
     for (name, profile) in all() {
@@ -75,7 +75,7 @@ fn ranges_agree_with_a_dense_polyline() {
 }
 
 #[test]
-fn ray_through_a_corner_and_its_ulp_neighbours_hit_it() {
+fn rays_through_a_corner_and_an_ulp_beside_it_hit_the_corner() {
     for (name, profile) in all() {
         let origin = profile.reference();
         for arc in profile.corners_m() {
@@ -117,10 +117,10 @@ fn rays_from_1_mm_off_the_wall_end_on_the_wall() {
     }
 }
 
-/// A ray up along a wall that runs into a half-circle without a corner touches the vault's circle where it begins.
+/// A ray runs up along a wall, which continues tangentially as a half-circle.
 ///
-/// A few ulps beside the wall, it crosses the circle above. The height above the springing is sqrt((2 - y) (2 + y)),
-/// without cancellation.
+/// The ray touches the circle at its start. A few ulps beside the wall, the ray crosses the circle above its start.
+/// The height of the crossing above the springing is sqrt((2 - y) (2 + y)), computed without cancellation.
 #[test]
 fn ray_tangent_to_the_vault_meets_it_at_the_springing() {
     let profile = arch(4.0, 4.0, 2.0).unwrap();
@@ -131,7 +131,7 @@ fn ray_tangent_to_the_vault_meets_it_at_the_springing() {
                 panic!("no wall {ulps} ulps beside the wall");
             };
             let above_m = math::sqrt((2.0 - half) * (2.0 + half));
-            // The circle's equation cancels: the error is an ulp of 4 m^2 under the root.
+            // The circle's equation has cancellation, so the error under the root is an ulp of 4 m^2.
             let error_m = (hit.range_m - (1.0 + above_m)).abs();
             assert!(error_m < 4.3e-8, "{ulps} ulps, y {y}: {error_m}");
             assert!(profile.contains([hit.point[0] * 0.999, hit.point[1]]));
@@ -141,7 +141,7 @@ fn ray_tangent_to_the_vault_meets_it_at_the_springing() {
 }
 
 #[test]
-fn ray_from_outside_has_no_range() {
+fn ray_from_outside_has_no_hit() {
     for (name, profile) in all() {
         assert_eq!(profile.cast([100.0, 1.0], [-1.0, 0.0]), None, "{name}");
         assert_eq!(profile.cast(profile.reference(), [0.0, 0.0]), None, "{name}");
@@ -166,7 +166,7 @@ fn invalid_curve_is_rejected_with_its_vertex() {
 }
 
 #[test]
-fn repeated_or_collinear_points_and_slivers_have_no_effect() {
+fn repeated_collinear_and_almost_equal_points_have_no_effect() {
     let plain = Profile::polygon(&[[2.0, 0.0], [2.0, 3.0], [-2.0, 3.0], [-2.0, 0.0]], None).unwrap();
     let messy = [
         [2.0, 0.0],
@@ -192,7 +192,7 @@ fn repeated_or_collinear_points_and_slivers_have_no_effect() {
 }
 
 proptest! {
-    /// The wall point at any arc length has that same arc length when seen from the reference point.
+    /// Seen from the reference point, the wall point at any arc length has that same arc length.
     #[test]
     fn point_at_and_arc_of_are_inverse(which in 0usize..7, share in 0.0f64..1.0) {
         let (name, profile) = all().swap_remove(which);
@@ -202,7 +202,6 @@ proptest! {
         prop_assert!(apart.abs() < 1e-9, "{} at {}: {}", name, arc, back);
     }
 
-    /// In reverse, from the hit back towards the origin, the origin is at the same distance.
     #[test]
     fn hit_lies_on_the_ray_and_on_the_wall(which in 0usize..7, y in -0.8f64..0.8, z in -0.8f64..0.8, turn in 0.0f64..1.0) {
         let (_, profile) = all().swap_remove(which);
