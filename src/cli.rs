@@ -360,7 +360,7 @@ pub(crate) enum Explain {
     /// The effects that would be simulated, with their reasons.
     List,
     /// The list, and the worth of each effect.
-    EffectInfluence,
+    Worth,
 }
 
 #[derive(Debug, Args)]

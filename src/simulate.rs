@@ -38,7 +38,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let scene = read(args.seed)?;
     match args.explain {
         Some(Explain::List) => return explain(&scene, None, args.json),
-        Some(Explain::EffectInfluence) => {
+        Some(Explain::Worth) => {
             let seeds = (scene.seed..).take(usize::from(args.seeds));
             let mut scenes = seeds.map(|seed| read(Some(seed))).collect::<Result<Vec<_>, _>>()?;
             let worth = worth_of(&mut scenes)?;
