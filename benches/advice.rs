@@ -1,9 +1,9 @@
 //! Compares the advised speed with the largest speed that truly passes, found by simulated dives. Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench advice` runs all parts; `-- truth`, `-- sweep` or `-- planned` runs one:
-//! - truth: `--dives N` (100) steady and swaying dives from `--from-seed N`, or `--seeds A,B,...`: advice over the
-//!   largest speed that passes;
-//! - sweep: four heads started for 0.1 m/s and driven at speeds 1 mm/s apart, and heads started for each of these
+//! `cargo bench -p headrace_tests --bench advice` runs all parts; `-- truth`, `-- sweep` or `-- planned` runs one part:
+//! - truth: ratio of the advised speed to the largest passing speed, over `--dives N` (100) steady and swaying dives
+//!   from `--from-seed N`, or over the dives of `--seeds A,B,...`;
+//! - sweep: four heads in phase for 0.1 m/s and driven at speeds 1 mm/s apart, then heads in phase for each of these
 //!   speeds;
 //! - planned: each shipped vehicle in each mode at 0.95 of the planned speed.
 //!
@@ -16,8 +16,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::{Compared, Outcome, Outing};
 
-/// Range of advice over truth that counts as right: at most a tenth too slow, and not too fast. The limits allow for
-/// rounding, because true speeds are found in steps of 2 %.
+/// Allowed ratio of advised to true speed: at most a tenth too slow, and never too fast. The limits allow for
+/// rounding, because the search for the true speed uses steps of 2 %.
 const LEAST: f64 = 0.899;
 const MOST: f64 = 1.005;
 
@@ -48,7 +48,7 @@ fn main() {
     }
 }
 
-/// Results of all items, in their order, computed on all cores.
+/// Results of all items in the order of the items, computed on all cores.
 fn all<T: Sync, R: Send>(of: &[T], run: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let work = || {

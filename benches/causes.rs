@@ -5,7 +5,7 @@
 //! - `wrong`: lists the stretches with a wrong cause;
 //! - `sections`: lists all sections;
 //! - `remedies`: also simulates the displayed remedy of each run;
-//! - `knowing`: prints how often a reference is right that knows everything about a dive except its noise.
+//! - `knowing`: prints how often a reference is right if it knows everything about a dive except its noise.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use headrace_tests::interventions::{Judged, Matrix, UpperBound, intervene, kinds, remedies};
 
-/// Median and largest hole of a stretch without each cause alone, over the target.
+/// Ratio of the hole to the target after removal of each single cause: median and largest over a stretch.
 fn over_target(sections: &[Judged], target_m: f64) -> String {
     let of_cause = |k: usize| {
         let mut over: Vec<f64> =

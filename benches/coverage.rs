@@ -2,10 +2,10 @@
 //! memory. Prints Markdown.
 //!
 //! `cargo bench -p headrace_tests --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory`
-//! no mode. Absolute times drift on shared machines, but the ratios hold. kiddo's tree and the hash map answer
-//! queries at given points only. On a grid of points their D is accurate to some centimetres, while headrace and the
-//! triangulation are exact. kiddo before version 6 panicked if more than 32 samples shared a coordinate; ideal heads
-//! produce only a few.
+//! runs only the memory part. Absolute times drift on shared machines, but the ratios hold. kiddo's tree and the hash
+//! map answer queries at given points only. On a grid of points their D is accurate to some centimetres, while
+//! headrace and the triangulation are exact. kiddo before version 6 panicked if more than 32 samples shared a
+//! coordinate; ideal heads produce only a few.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::disallowed_types, reason = "std's hash map is a reference here")]
@@ -27,7 +27,7 @@ const ROUNDS: usize = 5;
 const SECTION_M: f64 = 0.25;
 const SECTIONS: usize = 40;
 const LENGTH_M: f64 = 24.0;
-/// Spacing of the points of a section at which kiddo and the hash map are queried, m.
+/// Grid spacing of the points in a section at which kiddo and the hash map are queried, m.
 const GRID_M: f64 = 0.05;
 
 fn main() {
@@ -56,7 +56,7 @@ fn main() {
     memory();
 }
 
-/// Samples of ideal heads, all at the circle's centre, in order of time.
+/// Samples of ideal heads in time order; all heads are at the circle's centre.
 fn helix(steps: u32, turn_s: f64, heads: u32) -> Vec<WallSample> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
@@ -128,7 +128,7 @@ fn covering(what: &str, samples: &[WallSample]) {
     );
 }
 
-/// The holes of all sections by each method; times are per sample in those sections.
+/// Finds the holes of all sections with each method. Times are divided by the number of samples in those sections.
 fn holes(what: &str, samples: &[WallSample]) {
     let store = covered(samples);
     let sections = || (0..SECTIONS).map(|k| 7.0 + SECTION_M * k as f64);
@@ -143,12 +143,12 @@ fn holes(what: &str, samples: &[WallSample]) {
     let (to_a_centimetre, _) =
         best(|| sections().map(|x| tolerant.largest(&store, x, x + SECTION_M).most_m).sum::<f64>());
     row(&what, per_sample(ours), "ours, to 1 cm", per_sample(to_a_centimetre));
-    // The other methods get this search radius.
+    // Search radius of the other methods.
     let reach_m = exact.iter().copied().fold(0.0, f64::max) / 2.0 + 0.05;
     let around = |x: f64| {
         let window = (x - reach_m)..(x + SECTION_M + reach_m);
         let near = samples.iter().filter(move |s| window.contains(&s.x_m));
-        // Images across the seam.
+        // Samples near the seam get an image on its other side.
         near.flat_map(move |s| [-perimeter_m(), 0.0, perimeter_m()].map(|turn| [s.x_m, s.arc_m + turn]))
             .filter(move |s| s[1] > -reach_m - 0.1 && s[1] < perimeter_m() + reach_m + 0.1)
             .collect::<Vec<_>>()
@@ -177,10 +177,9 @@ fn holes(what: &str, samples: &[WallSample]) {
     );
 }
 
-/// Largest hole of a section, from Voronoi corners and edges.
+/// Finds the largest hole of a section from Voronoi corners and edges.
 ///
-/// Candidates are the corners of the Voronoi diagram in the section, and the crossings of its edges with the
-/// section's ends.
+/// Candidates are the Voronoi corners inside the section, and the points where Voronoi edges cross its ends.
 fn by_triangulation(from_m: f64, near: &[[f64; 2]]) -> f64 {
     let points = near.iter().map(|[x, sigma]| Point2::new(*x, *sigma)).collect();
     let triangulation = DelaunayTriangulation::<Point2<f64>>::bulk_load(points).unwrap();
@@ -209,7 +208,7 @@ fn by_triangulation(from_m: f64, near: &[[f64; 2]]) -> f64 {
     2.0 * math::sqrt(largest2)
 }
 
-/// Points of a section, on a grid.
+/// Grid points of a section.
 fn places(from_m: f64) -> impl Iterator<Item = [f64; 2]> {
     let columns = math::floor_to_i64(perimeter_m() / GRID_M);
     let rows = math::round_to_i64(SECTION_M / GRID_M);
@@ -234,7 +233,7 @@ fn by_hash_map(from_m: f64, near: &[[f64; 2]]) -> f64 {
         let [row, column] = cell_of(&place);
         let mut best2 = f64::INFINITY;
         for ring in 0_i64.. {
-            // Cells of a ring are at least as far as the width of the rings inside it.
+            // All cells of this ring are at least `ring` - 1 cell widths away.
             let inner_m = (ring - 1) as f64 * CELL_M;
             if ring > 0 && inner_m > 0.0 && inner_m * inner_m > best2 {
                 break;
@@ -260,7 +259,8 @@ fn resident() -> f64 {
     pages.split(' ').nth(1).and_then(|pages| pages.parse::<f64>().ok()).unwrap_or(f64::NAN) * 4096.0
 }
 
-/// Ten hours of four heads in FAST mode, 49 pings a second each, with noise of some centimetres: over 7 km, and parked.
+/// Measures the memory for ten hours of four heads in FAST mode, on a drive of 7 km and while parked. The heads send
+/// 49 pings a second each, with noise of some centimetres.
 fn memory() {
     for (what, length_m) in [("7 km in ten hours", 7_000.0), ("parked for ten hours", 0.0)] {
         let (before, perimeter_m) = (resident(), perimeter_m());

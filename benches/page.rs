@@ -1,11 +1,12 @@
-//! Cost of the page and its viewers for the loop, measured in the same dive of four heads in real time. Prints
+//! Cost that the page and its viewers cause in the loop, measured in one dive of four heads in real time. Prints
 //! Markdown.
 //!
 //! It compares four cases: without a page, with a page and no viewer, with ten viewers (one never reads and one
-//! floods), and without a page beside two busy threads. The last one is the reference, because a flood and its server
-//! keep two cores busy. `cargo bench -p headrace_tests --bench page` takes about four minutes; `-- 20` makes each
-//! dive last twenty seconds. Ticks come every 20 ms by the clock. The viewers are threads of this process on the same
-//! cores. Absolute times drift on shared machines, mostly in the tails. It panics if the dives' results differ.
+//! floods), and without a page beside two busy threads. The last case is the reference, because a flood and its
+//! server keep two cores busy. `cargo bench -p headrace_tests --bench page` takes about four minutes; `-- 20` makes
+//! each dive last twenty seconds. Ticks come every 20 ms by the clock. The viewers are threads of this process on the
+//! same cores. Absolute times drift on shared machines, mostly in the tails. The bench panics if the results of the
+//! four dives differ.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
@@ -32,7 +33,7 @@ use tungstenite::Message;
 
 const SPEED_MPS: f64 = 0.197;
 const TICK: DurNs = DurNs(20_000_000);
-/// Ticks a second.
+/// Number of ticks per second.
 const TICKS_PER_S: u64 = 50;
 /// Default duration of each dive, s.
 const MEASURED_S: u64 = 60;
@@ -40,7 +41,7 @@ const MEASURED_S: u64 = 60;
 const READING: usize = 8;
 /// Size of the notice queue, as in the program.
 const NOTICES: usize = 1 << 10;
-/// Delay before a refused flood connects again.
+/// Delay before a refused flooding viewer connects again.
 const AGAIN_AFTER: Duration = Duration::from_millis(10);
 
 fn main() {
@@ -68,7 +69,7 @@ fn main() {
     }
 }
 
-/// Load beside a dive.
+/// Load that runs beside a dive.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Beside {
     Nothing,
@@ -90,7 +91,7 @@ impl Beside {
     }
 }
 
-/// Keeps two cores busy until it is over.
+/// Keeps two cores busy until `is_over` is set.
 fn be_busy(is_over: &Arc<AtomicBool>) {
     for _ in 0..2 {
         let is_over = Arc::clone(is_over);
@@ -120,7 +121,7 @@ fn row(dive: &str, what: &str, times: &[Duration]) {
 }
 
 fn scene(seconds: u64) -> Scene {
-    // The path is slightly longer than the measurement.
+    // The path is slightly longer than the dive needs.
     let distance_m = (seconds + 10) as f64 * SPEED_MPS;
     scenes::scene(&format!(
         "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = {SPEED_MPS}\n[trajectory]\n\
@@ -128,14 +129,14 @@ fn scene(seconds: u64) -> Scene {
     ))
 }
 
-/// A message of a simulation for the loop.
+/// A message of the simulation, to be fed to the loop.
 struct Kept {
     at: MonoNs,
     source: u16,
     bytes: Vec<u8>,
 }
 
-/// The loop's messages in the first seconds of a scene.
+/// Messages for the loop in the first seconds of a scene.
 fn messages_of(scene: &Scene, seconds: u64) -> Vec<Kept> {
     let mut simulation = Simulation::new(scene).unwrap();
     let until = tick_end(seconds * TICKS_PER_S);
@@ -151,18 +152,18 @@ fn messages_of(scene: &Scene, seconds: u64) -> Vec<Kept> {
     panic!("the scene lasts less than {seconds} s");
 }
 
-/// End of a tick, from 1, in the dive's time.
+/// End of a tick in the dive's time; the first tick has number 1.
 fn tick_end(number: u64) -> MonoNs {
     START + DurNs(TICK.0 * i64::try_from(number).unwrap())
 }
 
 /// Measurements of a dive.
 struct Measured {
-    /// Durations of the ticks, with the filling of their rings.
+    /// Durations of the ticks, including the time to fill the rings.
     ticks: Vec<Duration>,
     /// Durations of the collector's work after each tick.
     collecting: Vec<Duration>,
-    /// Times from a tick's due time to the end of the tick and the collector's work.
+    /// Times from the due time of a tick to the end of both the tick and the collector's work.
     ends: Vec<Duration>,
     samples: u64,
     digest: u64,
@@ -194,7 +195,7 @@ fn dive(scene: &Scene, messages: &[Kept], seconds: u64, beside: Beside) -> Measu
     }
     is_over.store(true, Ordering::Relaxed);
     if let Some(page) = page {
-        // As in the feed's schema, without a report.
+        // This message follows the feed's schema, but its summary is empty.
         let digest = format!("{:016x}", armed.digest());
         page.end(Some(json!({"type": "end", "digest": digest, "exit": 0, "summary": {}, "way": null})));
     }
@@ -206,7 +207,7 @@ fn dive(scene: &Scene, messages: &[Kept], seconds: u64, beside: Beside) -> Measu
     measured
 }
 
-/// A loop of the scene's vehicle, configured as in the program.
+/// A loop for the scene's vehicle, configured as in the program.
 fn armed(scene: &Scene, is_followed: bool) -> (Loop, NoticeReceiver) {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
@@ -221,7 +222,7 @@ fn armed(scene: &Scene, is_followed: bool) -> (Loop, NoticeReceiver) {
     (app.arm(vehicle.navigation()).unwrap(), notices)
 }
 
-/// Feeds all messages tick by tick at their times; `beside` is called after each tick.
+/// Feeds all messages at their times, tick by tick, and calls `beside` after each tick.
 fn run(dive: &mut Loop, messages: &[Kept], seconds: u64, mut beside: impl FnMut(&Loop)) -> Measured {
     let mut ports: Vec<_> = (0..dive.sources().len()).map(|source| dive.take_port(source).unwrap()).collect();
     let (mut ticks, mut collecting, mut ends) = (Vec::new(), Vec::new(), Vec::new());
@@ -249,7 +250,7 @@ fn run(dive: &mut Loop, messages: &[Kept], seconds: u64, mut beside: impl FnMut(
     Measured { ticks, collecting, ends, samples: 0, digest: 0, notices_dropped: 0, page: String::new() }
 }
 
-/// Work of the program after each tick; without a page it only takes the notices.
+/// Work of the program after each tick. Without a page, this work only takes the notices.
 fn follow(mut collector: Option<&mut Collector>, notices: &NoticeReceiver, dive: &Loop) {
     while let Some(notice) = notices.next() {
         if let Some(collector) = &mut collector {
@@ -361,7 +362,7 @@ impl Viewers {
         Self { reading, _never_reads: never_reads, flooding }
     }
 
-    /// Waits for their ends; the page must have ended.
+    /// Waits for the viewers' threads to end; the page must have ended before.
     fn end(self) -> String {
         let seen: Vec<_> = self.reading.into_iter().map(|viewer| viewer.join().unwrap()).collect();
         let ended = seen.iter().filter(|(_, has_ended)| *has_ended).count();
@@ -373,7 +374,7 @@ impl Viewers {
     }
 }
 
-/// Sends as fast as possible and reconnects after each disconnection; returns the number of messages sent.
+/// Sends as fast as possible and reconnects after each disconnection. Returns the number of messages sent.
 fn flood(address: &str, is_over: &AtomicBool) -> u64 {
     let mut sent = 0;
     let message = Message::Text(json!({"do": "mark", "by": "flood"}).to_string().into());

@@ -1,11 +1,11 @@
-//! Delay of bytes from a device to the loop's ring, and the cost of serving ports. Prints Markdown.
+//! Delay of bytes on their way from a device to the loop's ring, and the CPU time of serving ports. Prints Markdown.
 //!
-//! Each figure is compared with a bare read loop on another port of the same kind in the same run.
-//! `cargo bench -p headrace_tests --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part. The parts are
-//! `-- latency`, `-- flag` and `-- cpu`. `flag` is the time from the last byte of a return to the end of its tick,
-//! when its flag is displayed, on idle and on busy cores. A thread of this process emulates the devices at their own
-//! rates. CAN (vcan0, up) and HID (`/dev/uhid`) are measured only where available, for instance in `tests/vm`.
-//! Absolute times drift on shared machines, mostly in the tails.
+//! Each figure is compared with that of a bare read loop, which runs at the same time on another port of the same
+//! kind. `cargo bench -p headrace_tests --bench ports` takes about two minutes; `-- 20` makes each part last twenty
+//! seconds. The parts are `-- latency`, `-- flag` and `-- cpu`. `flag` measures the time from the last byte of a
+//! return to the display of its flag at the end of the tick. It does so on idle and on busy cores. A thread of this
+//! process emulates the devices at their own rates. CAN (vcan0, up) and HID (`/dev/uhid`) are measured only where
+//! available, for instance in `tests/vm`. Absolute times drift on shared machines, mostly in the tails.
 
 #![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 #![expect(clippy::panic, reason = "the same")]
@@ -30,11 +30,11 @@ use headrace_simulator::{START, Scene, Simulation};
 use headrace_tests::scenes;
 
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
-/// Time for all lines to open and the heads to reach their angles.
+/// Time for all lines to open and for the heads to reach their start angles.
 const WARMING: DurNs = DurNs::from_millis(10_000);
 /// Default duration of each part, s.
 const MEASURED_S: u64 = 60;
-/// Longest wait of the devices for a host, ns.
+/// Longest time for which the devices wait for a host's bytes, ns.
 const WAIT_NS: u32 = 1_000_000;
 
 const WAY: &str = "[trajectory]\n[[trajectory.legs]]\ndistance_m = 60\nspeed_mps = 0.1\n";
@@ -42,7 +42,7 @@ const WAY: &str = "[trajectory]\n[[trajectory.legs]]\ndistance_m = 60\nspeed_mps
 const TUNNEL: &str = "name = \"ports\"\ntarget_m = 1\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n\
     [water]\nsound_speed_mps = 1447\n[heads]\nplanned_speed_mps = 0.1\n";
 
-/// Measured ports: name, carrier, and keys in a vehicle file.
+/// Measured ports, each with name, carrier and keys in a vehicle file.
 const LINES: [(&str, Carrier, &str); 10] = [
     ("881, returns of 13 bytes", Carrier::Serial, "plugin = \"imagenex881\"\nmode = \"fast\"\nrange_m = 10"),
     (
@@ -99,24 +99,24 @@ fn commit() -> String {
     answer("git", &["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty"])
 }
 
-/// Output of a program, or a note if there is none.
+/// Output of a program, or a note if the program is missing.
 fn answer(program: &str, arguments: &[&str]) -> String {
     let output = Command::new(program).args(arguments).output();
     let said = output.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
     said.ok().filter(|said| !said.is_empty()).unwrap_or_else(|| format!("unknown ({program} doesn't say)"))
 }
 
-/// Messages in transit with their send times, and the measured delays.
+/// Messages on their way to the loop with their send times, and the measured delays.
 #[derive(Clone, Default)]
 struct Course {
     sent: Arc<SegQueue<(MonoNs, Vec<u8>)>>,
     delays: Arc<SegQueue<DurNs>>,
-    /// Send times of messages that the loop hasn't consumed yet, and the delays to the ends of their ticks.
+    /// Send times of messages that the loop hasn't consumed yet. `ends` has the delays up to the ends of their ticks.
     to_consume: Arc<SegQueue<MonoNs>>,
     ends: Arc<SegQueue<DurNs>>,
 }
 
-/// The receiving end of a course.
+/// Receiving end of a [`Course`].
 struct Finish {
     course: Course,
     waiting: VecDeque<(MonoNs, Vec<u8>)>,
@@ -127,7 +127,7 @@ impl Finish {
         Self { course: course.clone(), waiting: VecDeque::new() }
     }
 
-    /// Send time of a received message; messages sent before it count as lost.
+    /// Returns the send time of a received message. Messages sent earlier and still waiting count as lost.
     fn sent(&mut self, bytes: &[u8]) -> Option<MonoNs> {
         self.look();
         let position = self.waiting.iter().position(|(_, message)| message == bytes)?;
@@ -146,7 +146,7 @@ impl Finish {
     }
 }
 
-/// A driver whose deliveries are timed.
+/// A driver whose deliveries are timestamped.
 struct Timed {
     driver: Box<dyn Driver>,
     finish: Finish,
@@ -168,8 +168,8 @@ impl Wire for TimedWire<'_> {
 
     fn deliver(&mut self, received: MonoNs, bytes: &[u8]) {
         let sent = self.finish.sent(bytes);
-        // Recorded before the loop can see it. Foreign data (none on sound lines) gets its delivery time as send
-        // time.
+        // The send time is recorded before the loop can see the message. Data that was never sent gets its delivery
+        // time instead; sound lines carry no such data.
         self.finish.course.to_consume.push(sent.unwrap_or_else(now));
         self.wire.deliver(received, bytes);
         if let Some(sent) = sent {
@@ -218,7 +218,7 @@ impl Driver for Timed {
     }
 }
 
-/// The reference: reads data as it arrives and records the delay.
+/// Reference: reads data as it arrives and records the delay.
 fn bare(connect: &Connect, finish: Finish) {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => {
@@ -260,7 +260,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     loop {
         let count = read(&mut buffer);
         let at = now();
-        // The device's end is closed at the end of the measurement.
+        // An end of file: the device's end is closed at the end of the measurement.
         if count == 0 {
             return;
         }
@@ -276,7 +276,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     }
 }
 
-/// A loop that is woken like the program's, and does nothing.
+/// Starts a thread that is woken like the program's loop, but does no work.
 fn empty_loop(course: &Course) -> thread::Thread {
     let course = course.clone();
     let empty = named("empty", move || {
@@ -290,7 +290,8 @@ fn empty_loop(course: &Course) -> thread::Thread {
     empty.thread().clone()
 }
 
-/// The ends of one sensor's two ports: the driver's and the reference's. On a bus both receive from the same port.
+/// The device's ends of one sensor's two ports. One port belongs to the driver and one to the reference. On a bus,
+/// both receive from the same port.
 struct Ends {
     ours: EmulatedPort,
     twin: Option<EmulatedPort>,
@@ -318,7 +319,7 @@ impl Ends {
         self.twin.as_ref().map_or_else(|| self.ours.connect().clone(), |twin| twin.connect().clone())
     }
 
-    /// Writes a message to both, alternating which is first.
+    /// Writes a message to both ports and alternates which one is first.
     fn write(&mut self, bytes: &[u8], ours_first: bool) {
         let [ours, twin] = &self.courses;
         let write = |stand: &mut EmulatedPort, courses: &[&Course]| {
@@ -349,9 +350,9 @@ impl Ends {
 struct Measured {
     /// Delays of the driver and of the reference, for each sensor.
     delays: Vec<[Vec<DurNs>; 2]>,
-    /// The same delays to the end of the tick, and in an empty loop.
+    /// Delays of the driver to the end of the tick, and of the reference to the end of a pass of the empty loop.
     ends: Vec<[Vec<DurNs>; 2]>,
-    /// CPU time of the threads by name prefix, s.
+    /// CPU time of the threads, grouped by name prefix, s.
     ports_s: f64,
     loop_s: f64,
     bare_s: f64,
@@ -359,7 +360,7 @@ struct Measured {
     took_s: f64,
 }
 
-/// Serves the sensors of a scene on these ends, and measures for this duration.
+/// Serves the sensors of a scene on these ends and measures for this duration.
 fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
@@ -440,7 +441,7 @@ fn run_s(beginning: &str) -> f64 {
     tasks.flatten().map(of).sum()
 }
 
-/// The devices: hosts' requests go to the simulation, and its messages to both ends.
+/// Emulates the devices: passes requests of hosts to the simulation, and its messages to both ports.
 fn emulate(mut simulation: Simulation, mut ends: Vec<Ends>, ending: &AtomicBool) {
     let origin = now();
     let mut is_ours_first = false;
@@ -512,7 +513,7 @@ fn latency(measured: Duration) {
     println!();
 }
 
-/// Measures the time from a return's last byte to the end of its tick, when its flag is displayed.
+/// Measures the time from a return's last byte to the display of its flag at the end of the tick.
 fn flags(measured: Duration) {
     println!("Last byte of a head's return written to the end of its tick, us: p50, p99, p99.9, max\n");
     println!("| cores | returns | ours | an empty loop | ours above it |\n|---|---|---|---|---|");

@@ -2,8 +2,8 @@
 //! alone. Prints Markdown.
 //!
 //! `cargo bench -p headrace_tests --bench replay` uses the first kilometre of `deploy/scenes/seven-kilometres.toml`
-//! and takes about a minute; `-- 7` uses all of it, and `-- DIVE.mcap ...` existing logs. The log that it makes is in
-//! the system's temporary folder (145 MB per kilometre) and is removed at the end.
+//! and takes about a minute; `-- 7` uses the whole scene, and `-- DIVE.mcap ...` uses existing logs. The bench writes
+//! its log to the system's temporary folder (145 MB per kilometre) and removes it at the end.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
@@ -35,7 +35,7 @@ fn main() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// Prints a log's replays beside its bare read.
+/// Prints the replay times of a log beside its bare read time.
 fn compare(log: &Path, name: &str, folder: &Path) {
     let report_file = folder.join("report.json");
     let (messages, _, first) = bare_read(log);
@@ -102,14 +102,14 @@ fn replayed(log: &Path, report: &Path, threads: usize) -> Replayed {
     Replayed { took: started.elapsed(), own_mib, file_mib }
 }
 
-/// A memory figure of a process from the system, MiB; zero if unavailable.
+/// A memory figure of a process as the system reports it, MiB; zero if unavailable.
 fn mib_of(child: &Child, key: &str) -> f64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
     let words = status.lines().find_map(|line| line.strip_prefix(key)).unwrap_or("0");
     words.trim().trim_end_matches(" kB").parse::<f64>().unwrap_or(0.0) / 1024.0
 }
 
-/// Messages, file size in bytes, and the time to read the file with the `mcap` crate.
+/// Number of messages, file size in bytes, and the time to read the file with the `mcap` crate.
 fn bare_read(log: &Path) -> (u64, u64, Duration) {
     let started = Instant::now();
     let mut file = std::fs::File::open(log).unwrap();

@@ -49,7 +49,7 @@ fn main() {
         ROUNDS
     );
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
-    // `cargo bench -p headrace_tests -- holes` runs one alone.
+    // A part's name as argument runs that part alone: `cargo bench -p headrace_tests -- holes`.
     let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
     let benches: [(&str, fn()); 6] = [
         ("loop", whole_loop),
@@ -99,7 +99,7 @@ impl Decoder for Nothing {
     }
 }
 
-/// Start of the first stage and end of each stage in the present tick.
+/// End time of each stage in all ticks so far.
 #[derive(Resource, Default)]
 struct Ends(Vec<Instant>);
 
@@ -143,19 +143,19 @@ fn app(scene: &Scene, decoding: bool) -> App {
     app
 }
 
-/// A message of a simulation for the loop.
+/// A message of the simulation, to be fed to the loop.
 struct Kept {
     at: MonoNs,
     source: u16,
     bytes: Vec<u8>,
 }
 
-/// Feeds all messages tick by tick; returns the duration of each tick including the filling of its rings.
+/// Feeds all messages tick by tick. Returns the duration of each tick, including the time to fill its rings.
 fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
     run_noting(dive, messages, &mut Vec::new())
 }
 
-/// As [`run`], and records the start of each tick.
+/// As [`run`]; also records the start of each tick.
 fn run_noting(dive: &mut Loop, messages: &[Kept], begins: &mut Vec<Instant>) -> Vec<Duration> {
     let mut ports: Vec<_> = (0..dive.sources().len()).map(|source| dive.take_port(source).unwrap()).collect();
     let mut ticks = Vec::new();
@@ -216,7 +216,7 @@ fn whole_loop() {
     );
 }
 
-/// Duration of a scene, and its messages for the loop.
+/// Duration of a scene, and the messages for the loop.
 fn messages_of(scene: &Scene) -> (f64, Vec<Kept>) {
     let mut simulation = Simulation::new(scene).unwrap();
     let data_s = simulation.duration_s();
@@ -229,14 +229,15 @@ fn messages_of(scene: &Scene) -> (f64, Vec<Kept>) {
     (data_s, messages)
 }
 
-/// Duration of each stage in each tick of a dive, us; and the loop at the end.
+/// Duration of each stage in each tick of a dive, us, and the loop after the dive.
 ///
-/// The first duration is the work before the first stage: rings, merge, start of the schedule.
+/// The first duration also contains all work before the first stage: filling rings, merging, and starting the
+/// schedule.
 fn spans(scene: &Scene) -> (Loop, Vec<Vec<f64>>) {
     let (_, messages) = messages_of(scene);
     let last = messages.last().map_or(START, |message| message.at);
     let mut dive = noting(scene, usize::try_from(last.since(START).0 / TICK.0).unwrap() + 2);
-    // The tick at arming has been recorded, too.
+    // Arming runs one tick, whose stages are recorded, too.
     let armed = dive.resource::<Ends>().unwrap().0.len();
     let mut begins = Vec::new();
     run_noting(&mut dive, &messages, &mut begins);
@@ -259,7 +260,7 @@ fn percentiles(mut span: Vec<f64>) -> String {
     format!("p50 {p50:.2} us, p99 {p99:.1} us, p99.9 {p999:.1} us, max {most:.0} us")
 }
 
-/// Percentiles of each stage over the ticks of a dive.
+/// Prints percentiles of each stage over the ticks of a dive.
 fn by_stage() {
     let (_, spans) = spans(&scenes::scene(SCENE));
     let whole_us: f64 = spans.iter().flatten().sum();
@@ -270,7 +271,8 @@ fn by_stage() {
     }
 }
 
-/// Cost of the alert list stage in a dive with a missed stretch every four metres, compared with a dive without any.
+/// Cost of the alert list stage in a dive with a missed stretch every four metres, compared with a dive that misses
+/// nothing.
 fn alerts() {
     const PAIRS: usize = 40;
     const WAY: &str =
@@ -310,7 +312,7 @@ fn idle_tick() {
     let mut world = World::new();
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());
-    // As many systems as the loop has, chained.
+    // A chain with as many systems as the loop has.
     schedule.add_systems((|| nothing(), || nothing(), || nothing(), || nothing(), || nothing()).chain());
     let bare = best(|| {
         let started = Instant::now();
@@ -327,7 +329,7 @@ fn idle_tick() {
     );
 }
 
-/// Samples of ideal heads, all at the circle's centre, in order of time.
+/// Samples of ideal heads in time order; all heads are at the circle's centre.
 fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, usize)> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
@@ -353,7 +355,8 @@ fn store(length_m: f64, capacity: usize) -> SampleStore {
     })
 }
 
-/// Stores all samples as the cover stage does: the nearest pass, the sample, the sections it touches.
+/// Stores all samples as the cover stage does: finds the nearest pass, stores the sample, and marks the touched
+/// sections.
 fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
     let mut coverage = Coverage {
         store: store(length_m, samples.len()),

@@ -1,7 +1,7 @@
 //! Cost of the viewers' data in a recorded demonstration. Prints Markdown.
 //!
-//! It compares building the view with all other work of the recorder's thread, and measures the bytes added to the
-//! log.
+//! The bench compares the time to build the view with all other work of the recorder's thread. It also measures the
+//! bytes that the view adds to the log.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
@@ -17,10 +17,10 @@ use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
 
 const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_under_test");
-/// Number of passes; the fastest counts.
+/// Number of passes over the log; the fastest pass counts.
 const PASSES: u32 = 5;
 
-/// A message from the recorder's queue.
+/// A message of the recorder's queue.
 struct Entry {
     lane: Lane,
     at: MonoNs,
@@ -106,7 +106,7 @@ fn read(log: &Path) -> (LogHeader, Vec<Entry>) {
 }
 
 fn view() -> View {
-    // Tunnel and heads of the demonstration.
+    // Tunnel and heads of the demonstration dive.
     View::new(Site {
         profile: shapes::ceran().unwrap(),
         target_m: 0.5,
@@ -136,7 +136,7 @@ fn written(header: &LogHeader, entries: &[Entry], with_view: bool) -> u64 {
     for entry in entries {
         match entry.lane {
             Lane::Raw(source) => log.raw(source, entry.at, entry.at, &entry.data).unwrap(),
-            // The order of a tick is that of its message.
+            // The tick's message contains the order of its packets.
             Lane::Tick => {
                 let tick = headrace_replay::log::format::Tick::decode(&entry.data).unwrap();
                 log.tick(tick.index, tick.now, &tick.order().collect::<Vec<_>>()).unwrap();

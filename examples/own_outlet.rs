@@ -1,6 +1,7 @@
-//! A custom outlet: a plugin whose system puts flagged sections into a bounded queue, which another thread prints.
+//! A custom outlet: a plugin with a system that puts flagged sections into a bounded queue. Another thread prints
+//! them.
 //!
-//! Run: `cargo run --example own_outlet [LOG.mcap]`. Without a log it uses a golden log of a vehicle that goes too
+//! Run: `cargo run --example own_outlet [LOG.mcap]`. Without a log it uses a golden log of a vehicle that moves too
 //! fast.
 
 use std::error::Error;

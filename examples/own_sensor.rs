@@ -1,9 +1,10 @@
-//! A custom sensor: a depth sensor that sends lines of text, in a loop that is fed three packets.
+//! A custom sensor: a depth sensor that sends lines of text. The example feeds three packets to a loop.
 //!
 //! A line is "P 590000 10.5": pressure in Pa and temperature in degrees Celsius.
 //!
-//! Run: `cargo run --example own_sensor`. A device of the product also has a `DeviceKind`, which reads its table in the
-//! vehicle file, and runs `codec_contract!`: CONTRIBUTING.md, "Adding a device".
+//! Run: `cargo run --example own_sensor`. A device of the product also needs a `DeviceKind`, which reads the device's
+//! table in the vehicle file, and a test with `codec_contract!`. CONTRIBUTING.md describes both under "Adding a
+//! device".
 
 use std::error::Error;
 
@@ -24,7 +25,7 @@ use headrace_vehicle::Mission;
 
 const LONGEST_LINE: usize = 32;
 const PERIOD: DurNs = DurNs::from_millis(100);
-/// Longest pause between the bytes of a line.
+/// Longest pause between two bytes of a line.
 const SILENCE: DurNs = DurNs::from_millis(200);
 
 /// The format of a line.
@@ -51,9 +52,10 @@ impl Framing for Lines {
     }
 }
 
-/// Decodes bytes to readings; each line is received with its first byte.
+/// Decodes bytes to readings; the receive time of a line is that of its first byte.
 ///
-/// A partial line is part of the state, so that a dive can be restored in the middle of a line. Settings aren't.
+/// The saved state includes a partial line, so that a dive can be restored in the middle of a line. It excludes
+/// settings.
 struct LineDecoder {
     codec: Framed<Lines, LONGEST_LINE>,
     clock: LineClock,
@@ -77,7 +79,7 @@ impl Decoder for LineDecoder {
     }
 }
 
-/// The device's side of the line, for simulations: sends a line every [`PERIOD`] from `next` on.
+/// The device's side of the line, for simulations. It sends one line every [`PERIOD`], the first at `next`.
 struct LineEmulator {
     next: MonoNs,
     latency: DurNs,
@@ -139,7 +141,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dive = app.arm(Box::new(navigation))?;
     let mut port = dive.take_port(0).ok_or("the port is taken")?;
 
-    // Packets needn't be lines: the second one ends within a line.
+    // Packets needn't coincide with lines: the second packet ends in the middle of a line.
     for (number, bytes) in (1..).zip(["P 590000 10.5\n", "P 591250 10.5\nP 5925", "00 10.6\n"]) {
         let received = MonoNs(number * 100_000_000);
         port.send(received, bytes.as_bytes())?;

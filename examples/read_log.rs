@@ -1,6 +1,6 @@
 //! Replays a dive log through the loop and prints each judged section of the wall.
 //!
-//! Run: `cargo run --example read_log [LOG.mcap]`; without a log, one of the golden logs.
+//! Run: `cargo run --example read_log [LOG.mcap]`; without a log it uses a golden log.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let log = std::env::args_os().nth(1).map_or_else(|| PathBuf::from(GOLDEN), PathBuf::from);
     let mut player = Player::open(&files_of(&[log])?)?;
 
-    // The vehicle file, and the files that it names, are attached to the log.
+    // The log has the vehicle file, and all files named in it, as attachments.
     let info = player.info();
     let text = info.vehicle_toml.clone().ok_or("no vehicle file is attached to this log")?;
     let attached = |name: &str| {
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dive = app.arm(vehicle.navigation())?;
     player.connect(dive.sources());
     drive(&mut dive, &mut player, Pace::default(), &mut |_| ())?;
-    // Judges the last sections, which later samples could still have changed.
+    // Judges the last sections too, which stay open as long as later samples could change them.
     dive.finish(&mut |_, _| ());
 
     println!("{}, target {} m", vehicle.name, vehicle.target_m);
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let Some(section) = sections.get(index) else { continue };
         let Some(hole) = section.hole else { continue };
         let from = station(sections.bounds_m(index).0);
-        // Without samples all around it, a hole has at least this diameter.
+        // The diameter is only a lower bound if the hole has no samples all around it.
         let diameter = format!("{}{:.3}", if hole.bounded { "" } else { ">" }, hole.diameter_m);
         println!("{from:>10}  {diameter:>8}  {:>6.3}  {}", section.hole_sd_m, section.verdict.as_str());
     }

@@ -14,7 +14,7 @@ use headrace_sampling::spacing::{Spiral, speed_for_target_mps};
 /// The paper's speed, m/s.
 const SPEED_MPS: f64 = 0.197;
 const TARGET_M: f64 = 0.5;
-/// Soundings of a ring per step. They find the largest step wherever in the turn the pings fall.
+/// Number of rays cast per step. Rays between the pings show the largest step for any phase of the pings.
 const PER_STEP: u32 = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -57,7 +57,7 @@ pub(crate) fn bare() {
             },
         ],
     );
-    assert_eq!(by_hand, simulated, "both say the same");
+    assert_eq!(by_hand, simulated, "both programs give the same messages");
     let ns = |seconds: f64| seconds * 1e9 / f64::from(by_hand.messages / 2);
     println!("\n| a scene without effects | ns a head's return |\n|---|---|");
     println!("| by hand: all heads' rays and bytes, in order of time | {:.0} |", ns(hand_s));
@@ -65,7 +65,7 @@ pub(crate) fn bare() {
     println!("| over the hand-written program, percent | {:+.1} |", 100.0 * (whole_s / hand_s - 1.0));
 }
 
-/// A vehicle file reduced to its heads, which come first in it.
+/// The part of a vehicle file that describes the heads; it comes before all other sensors.
 fn heads_alone(mut vehicle: Vec<u8>) -> Vec<u8> {
     let next = b"[[sensors]]\nid = \"ping_left\"";
     let heads = vehicle.windows(next.len()).position(|window| window == next);
@@ -154,7 +154,7 @@ impl<'a> ByHand<'a> {
     }
 }
 
-/// Measurements of a head until `until`.
+/// Measures all soundings of a head up to `until`.
 fn measure(head: &mut Head, mount: &Mount, profile: &Profile, until: MonoNs, due: &mut Vec<Sounding>) {
     let [y_m, z_m] = profile.reference();
     let level = Rot::<Tunnel, Body>::identity();

@@ -7,9 +7,9 @@ use headrace_tests::scenes;
 
 use crate::{EFFECTS, best, simulate};
 
-/// The scenes, each of some minutes.
+/// Shipped scenes with a duration of some minutes each.
 const SCENES: [&str; 6] = ["rehearsal", "steel", "collapse", "drop-outs", "leak-current", "small-pipe"];
-/// Effects for broken devices; no scene has them all.
+/// Effects for broken devices; no scene uses all of them.
 const FAULTS: [&str; 2] = ["stuck_range", "device_faults"];
 
 /// Prints a row for each scene.
@@ -37,14 +37,16 @@ fn scene(text: &str, seed: Option<u64>) -> Scene {
     scenes::seeded(text, &load, seed)
 }
 
-/// Time to simulate the called effects and every effect; the additional ones have this bench's parameters.
+/// Compares the time to simulate the effects that a scene calls for with the time for every effect. The additional
+/// effects use this bench's parameters.
 fn against_all(name: &str, text: &str, called: &Scene) {
     let mut all = text.to_owned();
     let mut count = called.simulated().len();
     let others =
         EFFECTS.iter().filter(|(name, _)| !FAULTS.contains(name) && !called.simulated().contains(name));
     for (name, keys) in others {
-        // Keys that name sensors of another vehicle are dropped; the effect then acts on all possible sensors.
+        // Keys that name sensors of another vehicle are dropped; the effect then acts on every sensor that it
+        // supports.
         let keys: Vec<&str> = keys.lines().filter(|line| !line.starts_with("sensors")).collect();
         let with = format!("{all}\n[effects.{name}]\n{}\n", keys.join("\n"));
         // Effects that are impossible in this scene are left out.

@@ -2,8 +2,8 @@
 //! Prints Markdown.
 //!
 //! `cargo bench -p headrace_tests --bench effects` runs all parts; `-- bare`, `-- cost`, `-- called` or `-- seven`
-//! runs one, and so does `-- mesh` in a build with `--features mesh`. Times are this thread's CPU time, the least of
-//! several alternating rounds. Other load on the machine hardly affects them.
+//! runs one part, and so does `-- mesh` in a build with `--features mesh`. Times are this thread's CPU time, the
+//! minimum over several alternating rounds. Other load on the machine hardly affects them.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
@@ -103,7 +103,7 @@ fn simulate(scene: &Scene) -> f64 {
     timed(|| while simulation.advance() {}).1
 }
 
-/// Least times of several pieces of work, each round doing all of them.
+/// Minimum time of each piece of work. Each round runs every piece once.
 fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
     let mut least = [f64::INFINITY; N];
     for _ in 0..rounds {
@@ -133,7 +133,7 @@ fn cost() {
                 simulate(&all)
             }],
         );
-        // A current changes the dive's duration.
+        // A current changes the dive's duration, so times are scaled to equal durations.
         let scale = |scene: &Scene| {
             Simulation::new(scene).map_or(1.0, |simulation| LENGTH_M / SPEED_MPS / simulation.duration_s())
         };
@@ -146,7 +146,7 @@ fn cost() {
     }
 }
 
-/// The whole tunnel with all effects.
+/// Simulates the whole tunnel with all effects.
 fn seven_kilometres() {
     let all = scene(6990.0, "sector_offset", &named(&EFFECTS));
     let duration_s = Simulation::new(&all).unwrap().duration_s();

@@ -1,4 +1,4 @@
-//! A wall of a million triangles, compared with the profile that it follows.
+//! Simulation speed with a wall of a million triangles, compared with the profile that the mesh follows.
 
 use headrace_geometry::tunnel::Profile;
 use headrace_simulator::Simulation;
@@ -11,12 +11,12 @@ const EFFECTS: [(&str, &str); 2] = [
     ("occlusion, and a beam of 16 rays", "motion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\n"),
 ];
 const WALL: &str = "[[tunnel.features]]\nkind = \"mesh\"\nfile = \"rock.ply\"\nrole = \"wall\"\n";
-/// Number of points around the profile and along the tunnel: a million triangles in 150 m.
+/// Number of points around the profile and along the tunnel; together they give a million triangles in 150 m.
 const SIDES: u32 = 400;
 const RINGS: u32 = 1_250;
 const LENGTH_M: f64 = 150.0;
 
-/// A wall of rock as binary PLY: the profile, moved by up to 2 cm at each vertex.
+/// A rock wall as binary PLY: the profile with each vertex displaced by up to 2 cm.
 fn rough(profile: &Profile) -> Vec<u8> {
     let header = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
@@ -33,7 +33,7 @@ fn rough(profile: &Profile) -> Vec<u8> {
             let share = 1.0 + 0.01 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5);
             let [y, z] = profile.point_at(profile.perimeter_m() * f64::from(side) / f64::from(SIDES));
             let x_m = LENGTH_M * f64::from(ring) / f64::from(RINGS);
-            #[expect(clippy::cast_possible_truncation, reason = "as scanners write it")]
+            #[expect(clippy::cast_possible_truncation, reason = "a mesh in the format that scanners write")]
             let place = [x_m, share * y, middle_m + share * (z - middle_m)].map(|c| c as f32);
             bytes.extend(place.iter().flat_map(|c| c.to_le_bytes()));
         }

@@ -4,32 +4,32 @@ use std::path::PathBuf;
 
 use headrace_tests::field_table::PLACES;
 
-/// Dives of a cell, in a full run and with `--quick`. A full run takes a quarter of an hour on two cores.
+/// Number of dives of a cell, in a full run and with `--quick`. A full run takes a quarter of an hour on two cores.
 const SEEDS: [u64; 2] = [2, 1];
-/// Vehicles of `--quick`, which also leaves out every second place.
+/// Vehicles of a run with `--quick`. Such a run also leaves out the middle place.
 const QUICK_VEHICLES: [&str; 2] = ["vita1", "vita2-4"];
 
 /// Arguments of a run.
 pub(crate) struct Arguments {
-    /// A tenth of everything.
+    /// Whether to run only a tenth of the dives.
     pub(crate) quick: bool,
-    /// Parts of a cell's name; an asterisk matches any.
+    /// Selected parts of a cell's name; `*` matches any part.
     pub(crate) cell: Vec<String>,
-    /// Dives of each cell.
+    /// Number of dives of each cell.
     pub(crate) seeds: u64,
     /// The first seed.
     pub(crate) from_seed: u64,
-    /// Length of each dive, m, instead of the vehicle's own.
+    /// Length of each dive, m; it overrides the vehicle's own length.
     pub(crate) metres: Option<f64>,
-    /// File of the figures.
+    /// Output file of the figures.
     pub(crate) json: PathBuf,
-    /// File for the table with the dives of all places together.
+    /// Output file of the table in which each row combines all places.
     pub(crate) csv: Option<PathBuf>,
 }
 
 impl Arguments {
     pub(crate) fn of(words: impl Iterator<Item = String>) -> Self {
-        // cargo adds --bench.
+        // Cargo adds `--bench`.
         let mut words = words.filter(|word| word != "--bench");
         let mut seeds = None;
         let json = headrace_tests::root().join("target/field.json");
@@ -73,7 +73,7 @@ impl Arguments {
         !skipped && name.iter().zip(&self.cell).all(named)
     }
 
-    /// Place of the selection, if it isn't one of the table's.
+    /// Selected place, if the table doesn't contain it.
     pub(crate) fn own_place_m(&self) -> Option<(&str, f64)> {
         let place = self.cell.get(2).filter(|place| PLACES.iter().all(|(known, _)| known != place))?;
         Some((place, place.parse().ok()?))

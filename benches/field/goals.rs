@@ -2,13 +2,13 @@
 
 use headrace_tests::field_table::{Cell, Condition, Driven, Figures, KINDS_OF_SOURCES};
 
-/// Largest share of false fails among the sections with D_true below 0.9 T. As shares of the length: largest
-/// undecided part, and smallest passed part of what could pass.
+/// Bounds of a cell's figures. They are the largest share of false fails among sections with D_true below 0.9 T, the
+/// largest undecided share of the length, and the smallest passed share of the passable length.
 struct Bounds {
     false_fails: f64,
     cannot_say: f64,
     passed: f64,
-    /// Least advised speed, over the speed of Eq. 16 with the vehicle's own occlusion.
+    /// Smallest ratio of advised speed to the speed of Eq. 16 with the vehicle's own occlusion.
     advice: f64,
 }
 
@@ -41,7 +41,8 @@ impl Missed {
         };
         let first_go = matches!(cell.driven, Driven::Planned | Driven::Stood | Driven::Advised);
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
-        // D is the best of several visits, but D_true is that of all visits together. A lively pilot goes back, too.
+        // D is the best of several visits, but D_true combines all visits. In the `Lively` condition, the pilot also
+        // goes back.
         let once = match cell.driven {
             Driven::Back => false,
             Driven::Planned | Driven::Stood | Driven::Times(_) => cell.condition != Condition::Lively,
@@ -69,7 +70,7 @@ impl Missed {
         }
     }
 
-    /// Names of the missed goals, as the table's columns.
+    /// Names of the missed goals, equal to the table's column names.
     pub(crate) fn names(&self) -> Vec<String> {
         let single = [
             ("passed", self.passed_over),
@@ -88,7 +89,7 @@ impl Missed {
     }
 }
 
-/// Advised speed over that of Eq. 16.
+/// Ratio of the advised speed to the speed of Eq. 16.
 pub(crate) fn advice_share(cell: &Cell, figures: &Figures) -> f64 {
     figures.advised_mps() / cell.vehicle.edge_mps
 }

@@ -1,15 +1,18 @@
-//! Verdicts and standard deviations of simulated field dives against their truth, by vehicle, condition, place and speed.
+//! Compares verdicts and standard deviations of simulated field dives with the truth.
 //!
-//! `cargo bench -p headrace_tests --bench field` runs all cells in a quarter of an hour on two cores and prints them as CSV, followed by the
-//! sections that passed although their true hole is over the target. docs/why/field.md explains the columns. Arguments, after `--`:
+//! `cargo bench -p headrace_tests --bench field` runs all cells in a quarter of an hour on two cores. It prints them as
+//! CSV, followed by the sections that passed although their true hole exceeds the target. docs/why/field.md explains
+//! the columns. Arguments, after `--`:
 //! - `--quick`: a tenth of the dives
-//! - `--cell VEHICLE/CONDITION/PLACE/SPEED`: only these cells; any part may be `*`, parts at the end may be left out, a place may be any chainage
-//! - `--seeds N`, `--from-seed N`: dives of each cell, and the first seed
+//! - `--cell VEHICLE/CONDITION/PLACE/SPEED`: only these cells. Any part may be `*`, trailing parts may be left out, and
+//!   a place may be any chainage
+//! - `--seeds N`, `--from-seed N`: number of dives of each cell, and the first seed
 //! - `--metres N`: length of each dive
 //! - `--json FILE`: where to write all figures (target/field.json)
-//! - `--csv docs/why/field.csv`: renews the table of the documents, which joins the dives of all places
+//! - `--csv docs/why/field.csv`: rewrites the documented table, whose rows combine all places
 //!
-//! D_true comes from `headrace_tests::truth`, which shares no code with the program's coverage. All other figures are the report's.
+//! D_true comes from `headrace_tests::truth`, which shares no code with the program's coverage. All other figures
+//! come from the report.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
@@ -46,7 +49,7 @@ fn run(cells: &[NamedCell], arguments: &Arguments) -> Vec<Figures> {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(NamedCell { cell, .. }) = cells.get(number) else { return done };
-            // Dives of several hours run once.
+            // A dive of several hours runs with one seed only.
             let count = if cell.let_in_m.is_some() { 1 } else { arguments.seeds };
             let seeds = arguments.from_seed..arguments.from_seed + count;
             let length_m = arguments.metres.unwrap_or(cell.vehicle.length_m);

@@ -1,4 +1,4 @@
-//! Cells, and their figures as CSV and JSON.
+//! Cells of the table, and their figures as CSV and JSON.
 
 use headrace_tests::field_table::{
     CONDITIONS, Cell, Condition, DRIVEN, FalsePass, Figures, KINDS_OF_SOURCES, PLACES, Place, VEHICLES,
@@ -9,10 +9,10 @@ use serde_json::json;
 use crate::arguments::Arguments;
 use crate::goals::{Missed, advice_share};
 
-/// Place that one vehicle reaches from a launch near the portal, m.
+/// Place that one vehicle reaches by driving from a launch near the portal, m.
 const DRIVEN_THERE: Place = ("driven", 6900.0);
 const LET_IN_M: f64 = 60.0;
-/// Places up to this chainage are the same in all tunnels, m.
+/// Places up to this chainage have the same chainage in all tunnels, m.
 const NEAR_M: f64 = 100.0;
 
 /// A cell with its name.
@@ -41,13 +41,13 @@ pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
             }
         }
     }
-    // The longest dives come first; at the end they would leave one core idle.
+    // The longest dives run first. If they ran last, one core would be idle at the end.
     cells.sort_by_key(|named| named.cell.let_in_m.is_none());
     cells
 }
 
-/// Whether the table has a cell. Wrong settings and broken devices are tried at one place, unless selected; one
-/// vehicle is driven far.
+/// Whether the table contains a cell. Wrong settings and broken devices run at one place only, unless selected. A
+/// single vehicle drives from the launch to the far place.
 fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, speed]: [&str; 2]) -> bool {
     if place == DRIVEN_THERE.0 {
         return vehicle.name == "vita2-4" && condition == Condition::DataSheet && speed == "planned";
@@ -57,13 +57,13 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if speed == "stood" && !stands && arguments.cell.is_empty() {
         return false;
     }
-    // The middle place only shows that results don't depend on the place.
+    // The middle place runs for few cells, because it only shows that results don't depend on the place.
     let told_apart = place != "3000"
         || ["vita1", "vita2-4"].contains(&vehicle.name) && ["planned", "advised"].contains(&speed);
     if !told_apart && arguments.cell.is_empty() {
         return false;
     }
-    // Results of these conditions don't depend on the place.
+    // Results under these conditions don't depend on the place.
     if [Condition::Told, Condition::AsBuilt].contains(&condition) && arguments.cell.is_empty() {
         return place == "portal" && ["planned", "stood"].contains(&speed);
     }
@@ -79,7 +79,7 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     common || asked || (place == "6900" && ["vita1", "vita2-4"].contains(&vehicle.name))
 }
 
-/// The table as CSV, a row for each cell; docs/why/field.md explains its columns.
+/// The table as CSV with one row for each cell; docs/why/field.md explains its columns.
 pub(crate) fn csv(cells: &[NamedCell], figures: &[Figures]) -> String {
     let nis = KINDS_OF_SOURCES.map(|(name, _)| format!("nis_{}", name.replace(' ', "_"))).join(",");
     let mut text = format!(
@@ -92,7 +92,7 @@ pub(crate) fn csv(cells: &[NamedCell], figures: &[Figures]) -> String {
     text
 }
 
-/// A line for each section that passed although its true hole is over the target.
+/// One line for each section that passed although its true hole exceeds the target.
 pub(crate) fn falsely(cells: &[NamedCell], figures: &[Figures]) -> String {
     let line = |name: &[String; 4], section: &FalsePass| {
         let [told_m, sd_m, true_m] = section.hole_m;
@@ -111,7 +111,8 @@ pub(crate) fn falsely(cells: &[NamedCell], figures: &[Figures]) -> String {
     cells.iter().zip(figures).map(of_cell).collect()
 }
 
-/// Cells with the dives of all places pooled, for a page; the printed table has the places separately.
+/// Cells for the documented table, each with the dives of all places combined. The printed table keeps places
+/// separate.
 pub(crate) fn pooled(cells: &[NamedCell], figures: &[Figures]) -> (Vec<NamedCell>, Vec<Figures>) {
     let mut pools: Vec<(NamedCell, Figures)> = Vec::new();
     for (NamedCell { name: [vehicle, condition, _, speed], cell }, figures) in cells.iter().zip(figures) {
@@ -157,7 +158,7 @@ fn judged<'a>(
     cells.iter().zip(figures).map(|(cell, figures)| (cell, figures, Missed::of(&cell.cell, figures)))
 }
 
-/// Writes the figures.
+/// Writes all figures to a file.
 pub(crate) fn write_json(cells: &[NamedCell], figures: &[Figures], arguments: &Arguments) {
     let cells: Vec<_> = judged(cells, figures)
         .map(|(NamedCell { name, cell }, figures, missed)| {

@@ -12,16 +12,16 @@ use nalgebra_of_peers as peers;
 
 use crate::dive::Dive;
 
-/// Indices of the measured errors, which are the attitude's.
+/// State indices of the measured errors: the attitude's three.
 const MEASURED: [usize; 3] = [6, 7, 8];
 const NOISE: f64 = 1e-3;
 const INNOVATION: f64 = 1e-3;
 
-/// Factors of a covariance without zeros.
+/// Factors of a covariance in which no element is zero.
 pub(crate) fn factors<const N: usize>() -> Factors<N> {
     let mut factors = Factors::independent([0.01; N]);
     for k in 0..N {
-        // No two directions are parallel.
+        // Distinct directions: no two are parallel.
         let a = core::array::from_fn(|i| ((3 * i + 5 * k + i * k) % 11) as f64 / 11.0 - 0.4);
         factors.add(0.001, a, N);
     }
@@ -39,7 +39,7 @@ fn transition() -> [[f64; ERRORS]; ERRORS] {
     core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]))
 }
 
-/// Hand-written with nalgebra's matrices of fixed size, the update in Joseph's form.
+/// Hand-written filter on nalgebra's matrices of fixed size; its update uses Joseph's form.
 #[derive(Clone)]
 pub(crate) struct Dense<const N: usize> {
     x: SVector<f64, N>,
@@ -78,7 +78,7 @@ impl<const N: usize> Dense<N> {
     }
 }
 
-/// The crate `kfilter`.
+/// Filter of the crate `kfilter`.
 #[derive(Clone)]
 pub(crate) struct Published<const N: usize> {
     filter: KalmanLinearNoInput<f64, N>,

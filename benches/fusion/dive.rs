@@ -23,7 +23,7 @@ pub(crate) const GRAVITY_MPS2: f64 = 9.806_65;
 pub(crate) const SAMPLE_S: f64 = 0.01;
 const SAMPLE: DurNs = DurNs(10_000_000);
 const SAMPLES: usize = 10;
-/// Two minutes of epochs, which fill the clones.
+/// Number of epochs in two minutes, enough to fill all clones.
 const EPOCHS_BEFORE: usize = 1300;
 /// The echosounders look left, right and up.
 const YAWS_AND_PITCHES: [(f64, f64); 3] =
@@ -42,7 +42,7 @@ pub(crate) struct Dive {
 }
 
 impl Dive {
-    /// A dive after some minutes.
+    /// State of a dive that has run for some minutes.
     pub(crate) fn under_way() -> Self {
         let mut dive = Self::begin();
         for _ in 0..EPOCHS_BEFORE {
@@ -86,7 +86,7 @@ impl Dive {
         Self { context, window: Window::default(), sources, running, readings }
     }
 
-    /// One epoch: ten inertial samples, and eight measured numbers in six readings.
+    /// Runs one epoch: ten inertial samples, and six readings with eight measured numbers.
     pub(crate) fn epoch(&mut self) {
         let began = self.running.at;
         let mut at = began;
@@ -104,7 +104,7 @@ impl Dive {
         self.window.forget(at);
     }
 
-    /// All readings must have been used; otherwise the figures are meaningless.
+    /// Checks that all readings have been used, since otherwise the figures are meaningless.
     fn check(&self) {
         assert!(self.running.is_sound());
         for source in self.sources.iter().flatten() {

@@ -1,8 +1,8 @@
-//! Speed of the navigation filter's parts, each compared with a dense filter of as many states in the same run.
-//! Prints Markdown.
+//! Speed of the navigation filter's parts, each compared in the same run with a dense filter that has the same number
+//! of states. Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench fusion` runs on one core in some seconds. Rounds alternate and the best one
-//! counts. Absolute times drift on shared machines, but the ratios hold.
+//! `cargo bench -p headrace_tests --bench fusion` runs on one core in some seconds. The measured parts alternate, and
+//! the best round of each one counts. Absolute times drift on shared machines, but the ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
@@ -41,7 +41,7 @@ fn main() {
         std::env::consts::OS
     );
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
-    // `cargo bench -p headrace_tests --bench fusion -- predict` runs one alone.
+    // A part's name as argument runs that part alone: `cargo bench -p headrace_tests --bench fusion -- predict`.
     let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
     let benches: [(&str, fn()); 4] =
         [("predict", predict), ("update", update), ("sample", sample), ("epoch", epoch)];
@@ -62,7 +62,7 @@ fn cpu() -> String {
 /// Work to be timed; the argument is its number of repetitions.
 type Work<'a> = &'a mut dyn FnMut(u32);
 
-/// Best time of each for one run, ns.
+/// Best time of each piece of work for one run, ns.
 fn in_turns<const K: usize>(mut works: [Work<'_>; K]) -> [f64; K] {
     let mut best = [f64::INFINITY; K];
     for _ in 0..ROUNDS {
@@ -90,7 +90,7 @@ fn row(what: &str, ns: f64, yardstick: &str, yardstick_ns: f64) {
     println!("| {what} | {ns:.0} ns | {yardstick}: {yardstick_ns:.0} ns | {:.2} |", ns / yardstick_ns);
 }
 
-/// Prediction from the previous epoch to this one, without measurements.
+/// Measures the prediction from one epoch to the next, without measurements.
 fn predict() {
     let dive = Dive::under_way();
     let settings = Settings::default();
@@ -117,7 +117,7 @@ fn predict() {
     row(what, ours, "`kfilter`, 20 states", kfilter);
 }
 
-/// Three rows of an attitude, for factors of `N` states.
+/// Three measurement rows of an attitude, for factors of `N` states.
 fn attitude_rows<const N: usize>() -> [([f64; N], f64, f64); 3] {
     let dive = Dive::under_way();
     let rows = measure::attitude(&dive.state(), dive.state().attitude, 0.03, 0.02);
@@ -136,7 +136,7 @@ fn three_rows<const N: usize>(factors: &mut Factors<N>, rows: &[([f64; N], f64, 
     black_box(errors);
 }
 
-/// Update by three measured numbers, of the estimate and its covariance.
+/// Measures the update of estimate and covariance by three measured numbers.
 fn update() {
     let (rows20, rows18, rows15) = (attitude_rows::<20>(), attitude_rows::<18>(), attitude_rows::<15>());
     let (factors20, factors18, factors15) =
@@ -158,7 +158,7 @@ fn update() {
     row("3-row update, 20 states", ours20, "`kfilter`, 20 states, not Joseph's form", kfilter);
 }
 
-/// An inertial sample of a turning vehicle.
+/// Measures an inertial sample of a turning vehicle.
 fn sample() {
     let state = Dive::under_way().state();
     let (rate, force) = ([0.02, -0.01, 0.03], [0.3, 0.2, 9.8]);
@@ -186,7 +186,7 @@ fn sample() {
     );
 }
 
-/// A complete epoch of the filter.
+/// Measures a complete epoch of the filter.
 fn epoch() {
     let mut dive = Dive::under_way();
     let ((mut clones, mut at), factors) = (dive.clones(), dive.factors());

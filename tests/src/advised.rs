@@ -1,4 +1,4 @@
-//! Dives whose advice is recorded at each update, as a pilot sees it, and followed.
+//! Dives in which a vehicle follows the live advice, which is recorded at each update as the pilot sees it.
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::App;
@@ -40,7 +40,7 @@ impl PacketSource for Partly {
     }
 }
 
-/// Advice at each update, and the result of the dive.
+/// Advice at each update, with the results of the dive.
 pub struct Advised {
     /// Advice at each update.
     pub beats: Vec<AdviceEntry>,
@@ -50,7 +50,7 @@ pub struct Advised {
     pub digest: u64,
 }
 
-/// Simulates and replays a scene with this tick length; the source with the id `dumb` sends nothing.
+/// Simulates a scene and replays it with this tick length. The source with the id `dumb` sends nothing.
 pub fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

@@ -1,6 +1,6 @@
-//! Separates drops before the loop from a log's other losses.
+//! Separates packets that were dropped before the loop from all other losses of a log.
 
-/// Splits a log's losses into the number of packets dropped by lines, and all others.
+/// Splits a log's losses. Returns the number of packets that the lines dropped, and all other losses.
 pub(crate) fn apart(losses: &[String]) -> (u64, Vec<&String>) {
     let (dropped, others): (Vec<&String>, Vec<&String>) =
         losses.iter().partition(|loss| loss.contains(" dropped by the kernel or a full queue"));

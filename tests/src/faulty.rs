@@ -19,20 +19,20 @@ const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const WAIT_NS: u32 = 1_000_000;
 const BAUD: u32 = 115_200;
 
-/// A fault of a line: it changes the data that cross the line.
+/// A fault of a line, which changes the data on that line.
 pub trait Fault: Send {
-    /// Sends a frame of the device, the `number`th, to the host.
+    /// Sends frame `number` of the device to the host.
     fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
         let _ = number;
         line.whole(frame);
     }
 
-    /// Takes bytes from the host and returns those that reach the device.
+    /// Takes bytes from the host and returns the bytes that reach the device.
     fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
         bytes
     }
 
-    /// Runs between frames, in every cycle.
+    /// Runs in every cycle between frames.
     fn meanwhile(&mut self, line: &mut Wire) {
         let _ = line;
     }
@@ -43,18 +43,18 @@ pub struct Healthy;
 
 impl Fault for Healthy {}
 
-/// A device's end that can be unplugged and plugged in again where it was.
+/// The device's end of a line, which can be unplugged and plugged in again at the same place.
 pub struct End {
     connect: Connect,
-    /// For a serial port: its stable name, which links to the system's name.
+    /// Stable name of a serial port, a link to the system's name; `None` for other ports.
     link: Option<PathBuf>,
     stand: Option<EmulatedPort>,
-    /// Whether it shares the line of the sensor before it.
+    /// Whether the device shares the line of the previous sensor.
     beside: bool,
 }
 
 impl End {
-    /// A serial port with a stable name in `folder`, as udev's links by identity.
+    /// A serial port with a stable name in `folder`, like udev's links by identity.
     pub fn serial(folder: &std::path::Path, name: &str) -> Self {
         let link = folder.join(name);
         let port = SerialPort::Path(link.display().to_string());
@@ -83,22 +83,22 @@ impl End {
         Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
     }
 
-    /// The line of the sensor before, whose end is `other`.
+    /// An end on the line of the previous sensor, which has the end `other`.
     pub fn beside(other: &Self) -> Self {
         Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
     }
 
-    /// Whether it shares the line of the sensor before it.
+    /// Whether the device shares the line of the previous sensor.
     pub fn is_beside(&self) -> bool {
         self.beside
     }
 
-    /// Whether it is a serial port.
+    /// Whether the end is a serial port.
     pub fn is_pseudoterminal(&self) -> bool {
         self.link.is_some()
     }
 
-    /// The same end, not plugged in yet.
+    /// Returns the same end, not plugged in yet.
     #[must_use]
     pub fn absent(mut self) -> Self {
         self.unplug();
@@ -129,12 +129,12 @@ impl End {
     }
 }
 
-/// Controls of a device under test, and its counters.
+/// Controls and counters of a device under test.
 #[derive(Default)]
 pub struct Control {
     unplugged: AtomicBool,
     silent: AtomicBool,
-    /// Whether it is silent.
+    /// Whether the device is silent.
     quiet: AtomicBool,
     gone: AtomicBool,
     healed: AtomicBool,
@@ -142,7 +142,7 @@ pub struct Control {
 }
 
 impl Control {
-    /// Unplugs the device at its next request.
+    /// Unplugs the device when the next request arrives.
     pub fn unplug(&self) {
         self.unplugged.store(true, Ordering::SeqCst);
     }
@@ -166,7 +166,7 @@ impl Control {
         self.silent.store(false, Ordering::SeqCst);
     }
 
-    /// Ends the fault of its line.
+    /// Ends the fault of the line.
     pub fn heal(&self) {
         self.healed.store(true, Ordering::SeqCst);
     }
@@ -184,7 +184,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// Sends a frame whole.
+    /// Sends a whole frame.
     pub fn whole(&mut self, frame: &[u8]) {
         self.part(frame);
         let called = self.end.stand.as_ref().is_some_and(EmulatedPort::is_called);
@@ -198,25 +198,25 @@ impl Wire {
         }
     }
 
-    /// Counts frames that were sent whole by other means.
+    /// Adds frames that were sent whole in another way to the count.
     pub fn count(&self, frames: u64) {
         self.control.whole.fetch_add(frames, Ordering::SeqCst);
     }
 
-    /// Waits.
+    /// Waits for a time in milliseconds.
     pub fn pause(ms: u64) {
         thread::sleep(Duration::from_millis(ms));
     }
 }
 
-/// A device on a line that may fail, in its own thread.
+/// A device in its own thread, on a line that may fail.
 pub struct Faulty {
     control: Arc<Control>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Faulty {
-    /// Starts the devices of one line; they run until this is dropped.
+    /// Starts the devices of one line. They run until the result is dropped.
     pub fn start(devices: Vec<Emulated>, end: End, fault: Box<dyn Fault>) -> Self {
         let control = Arc::new(Control::default());
         control.unplugged.store(end.stand.is_none(), Ordering::SeqCst);
@@ -285,7 +285,8 @@ impl Life {
         self.step(None);
         let out = std::mem::take(&mut self.out);
         if unplugging && asked {
-            // A new request shows that the host has read all earlier answers. It gets half of this one.
+            // A new request shows that the host has read all earlier answers. Before the unplugging, the host gets
+            // half of the answer to this request.
             if let Some(frame) = out.first() {
                 self.wire.part(&frame[..frame.len() / 2]);
             }
@@ -316,7 +317,7 @@ impl Life {
     }
 }
 
-/// Lets a device receive and measure, always the same values.
+/// Passes received bytes to a device and lets it measure; the measured values are constant.
 fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
     match device {
         Emulated::Head(device) | Emulated::Echosounder(device) => {
@@ -333,7 +334,7 @@ fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<
     }
 }
 
-/// Lets a device receive, and measure the values that `feel` fills in.
+/// Passes received bytes to a device and lets it measure the values from `feel`.
 pub(crate) fn step<M: Measurement>(
     device: &mut dyn Emulator<M>,
     heard: Option<&[u8]>,

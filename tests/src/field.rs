@@ -1,4 +1,4 @@
-//! The field scene with suitable settings, and error figures of its trajectory.
+//! The field scene with settings that suit it, and the errors of the estimated trajectory.
 
 use headrace_fusion::Fix;
 use headrace_geometry::frames::{Tunnel, Vec3};
@@ -22,7 +22,7 @@ pub struct Figures {
     pub up_m: f64,
     /// Chainage, m.
     pub along_m: f64,
-    /// Displacement over a turn of a head, m.
+    /// Displacement during one turn of a head, m.
     pub turn_m: f64,
     /// Reported standard deviation of that displacement, m.
     pub turn_arc_m: f64,
@@ -65,7 +65,7 @@ pub fn figures(track: &Track) -> Figures {
     }
 }
 
-/// Errors of the displacement over a turn, with their reported standard deviations.
+/// Errors of the displacement during one turn, with their reported standard deviations.
 pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
     let mut before = 0;
     let mut turns = Vec::new();
@@ -84,7 +84,7 @@ pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
 
 /// Settings that match the field scene's sensor effects.
 ///
-/// These are rays instead of cones for the echosounders, and rounding of cable and depth as noise.
+/// In this scene the echosounders' beams are rays, not cones. The rounding of cable and depth is stated as noise.
 pub const SETTINGS: &str = "[navigation]
 gyro_noise_degps_rthz = 0.007
 accel_noise_mps2_rthz = 0.001
@@ -111,7 +111,7 @@ pub fn field(seed: u64, length_m: f64) -> Scene {
     field_with(seed, length_m, SETTINGS, "")
 }
 
-/// The field scene with other settings, and with the line `without` removed.
+/// The field scene with other settings, and without the line `without`.
 pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Scene {
     let scene = include_str!("../../deploy/scenes/vita1-field.toml");
     let length = format!("distance_m = {length_m}");
@@ -121,7 +121,7 @@ pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Sc
     assert!(shorter.contains(&length) && planned != scene && scene.contains(without));
     let load = |name: &str| {
         let text = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
-        // Settings replace the vehicle's own.
+        // These settings replace the vehicle's own `[navigation]` table.
         let own = text.find("[navigation]").filter(|_| settings.starts_with("[navigation]"));
         let (before, heads) = text.split_at(text.find("[heads]").ok_or("no heads")?);
         let before = own.map_or(before, |from| &before[..from]);
@@ -140,7 +140,7 @@ pub fn nees(epoch: &tracking::Epoch) -> f64 {
     error.dot(&covariance.cholesky().unwrap().solve(&error))
 }
 
-/// Share of true values, 0 to 1; 0 without values.
+/// Fraction of values that are true, 0 to 1; 0 without values.
 pub fn share(of: impl Iterator<Item = bool>) -> f64 {
     let (mut n, mut yes) = (0.0, 0.0);
     for is in of {

@@ -1,9 +1,10 @@
-//! Finds when a failed section can no longer be recovered by going on forward, from the poses and samples of a dive.
+//! Finds when a failed section can no longer be recovered by further forward motion, from the poses and samples of a
+//! dive.
 //!
-//! A place fails for good when two things hold for the first time. A circle about it is empty that is larger than the
-//! target plus an allowance for position errors. And no head that goes on forward can lay a sample into that circle:
-//! everything in reach lies beyond it. A head's reach is the wall that rays in its plane meet at its present
-//! attitude.
+//! A place has failed for good at the first moment when both of these conditions hold. First, an empty circle about
+//! the place is larger than the target plus an allowance for position errors. Second, the reach of all heads lies
+//! beyond this circle, so that no head on a vehicle in forward motion can put a sample into it. The reach of a head
+//! is the wall that rays in the head's plane meet at its present attitude.
 
 use std::ops::Range;
 
@@ -19,12 +20,12 @@ use headrace_oracle::wall::Wall;
 pub const EVERY: DurNs = DurNs(100_000_000);
 /// Number of rays round a head.
 const RAYS: u32 = 48;
-/// Number of parts of a section that are searched for the earliest fail.
+/// Number of parts into which a section is divided for the search for its earliest fail.
 pub const PARTS: u32 = 16;
-/// Tolerance of the chainage that all heads have passed, m. The program checks it five times a second, and takes the
-/// farthest wall for the reach of a tilted head.
+/// Tolerance of the chainage that all heads have passed, m. The program updates this chainage five times a second,
+/// and takes the farthest wall as the reach of a tilted head.
 pub const NEAR_M: f64 = 0.12;
-/// Shorter backward motion counts as wobbling, m.
+/// A shorter backward motion counts as sway, m.
 const WAY_BACK_M: f64 = 0.05;
 
 /// Reach of the heads at a moment.
@@ -32,18 +33,18 @@ const WAY_BACK_M: f64 = 0.05;
 pub struct Reached {
     /// Time.
     pub at: MonoNs,
-    /// Least chainage at which a head can lay a sample, m.
+    /// Smallest chainage at which a head can lay a sample, m.
     pub rear_m: f64,
-    /// Greatest chainage at which a head can lay a sample, m.
+    /// Largest chainage at which a head can lay a sample, m.
     pub front_m: f64,
 }
 
-/// Reach of the heads during a dive.
+/// Computes the reach of the heads at intervals during a dive.
 pub fn reached(dive: &Dive) -> Vec<Reached> {
     let mut all: Vec<Reached> = Vec::new();
     for (index, ping) in dive.pings.iter().enumerate() {
         let due = all.last().is_none_or(|last| ping.received.since(last.at).0 >= EVERY.0);
-        // The last ping counts too, because the dive ends there.
+        // The last ping is always included, because the dive ends there.
         let due = due || index + 1 == dive.pings.len();
         if let Some(pose) = ping.pose.filter(|_| due) {
             let [rear_m, front_m] = ends_m(dive, &pose);
@@ -53,7 +54,7 @@ pub fn reached(dive: &Dive) -> Vec<Reached> {
     all
 }
 
-/// Chainage from which on all heads have passed, wherever they started, m.
+/// Smallest chainage from which all heads have passed every place, m. It depends on where the heads started.
 pub fn all_passed_from_m(reached: &[Reached]) -> f64 {
     reached.iter().map(|reached| reached.front_m).fold(f64::INFINITY, f64::min)
 }
@@ -75,8 +76,9 @@ fn ends_m(dive: &Dive, pose: &Pose) -> [f64; 2] {
     [rear_m, front_m]
 }
 
-/// Least chainage in a section about which a circle of this radius is empty and lies beyond `passed_m`. The
-/// resolution is a part of the section ([`PARTS`]); the result is never too small.
+/// Smallest chainage of a place in a section with an empty circle of this radius that lies wholly beyond `passed_m`.
+///
+/// The resolution is one part of the section ([`PARTS`]), and the result is never too small.
 pub fn first_failing_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, passed_m: f64) -> Option<f64> {
     let from_m = from_m.max(passed_m + radius_m);
     if from_m >= to_m { None } else { first_in_m(wall, [from_m, to_m], radius_m, PARTS) }
@@ -92,26 +94,26 @@ fn first_in_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, parts: u32) 
     half([from_m, middle_m]).or_else(|| half([middle_m, to_m]))
 }
 
-/// First moment at which everything in reach lies beyond a chainage.
+/// First moment at which the reach of all heads lies beyond a chainage.
 pub fn left_behind(reached: &[Reached], chainage_m: f64) -> Option<MonoNs> {
     reached.iter().find(|reached| reached.rear_m >= chainage_m).map(|reached| reached.at)
 }
 
-/// The wall as sampled up to a moment.
+/// The wall with all samples up to a moment.
 pub fn wall_until(dive: &Dive, until: MonoNs) -> Wall {
     let before = |ping: &&Ping| ping.received <= until;
     let samples = dive.pings.iter().filter(before).filter_map(|ping| ping.sample);
     Wall::new(samples.map(|sample| sample.place), dive.profile.perimeter_m()).unwrap()
 }
 
-/// The flag of a section as it should be, and as the loop raised it.
+/// The flag of a section: when it was due, and when the loop raised and cleared it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flag {
     /// Chainage of the section's start, m.
     pub start_m: f64,
-    /// First moment from which going on forward can't undo the fail, seconds.
+    /// First moment after which forward motion can't undo the fail, seconds.
     pub due_s: Option<f64>,
-    /// The same moment, at the earliest that the resolution of the parts allows, seconds.
+    /// Earliest value of `due_s` within the resolution of the parts, seconds.
     pub may_s: Option<f64>,
     /// End of the dive, seconds.
     pub end_s: f64,
@@ -119,37 +121,38 @@ pub struct Flag {
     pub raised_s: Option<f64>,
     /// Time at which the loop cleared the flag, seconds.
     pub cleared_s: Option<f64>,
-    /// Distance that the reach had moved since the due moment when the flag was raised, m.
+    /// Distance that the reach moved between the due moment and the raising of the flag, m.
     pub late_m: Option<f64>,
-    /// Whether the section fails with all samples counted.
+    /// Whether the section fails with all samples of the dive.
     pub fails: bool,
 }
 
 impl Flag {
-    /// Whether only the end of the dive raised it.
+    /// Whether the flag was raised only because the dive ended.
     pub fn raised_at_the_end(&self) -> bool {
         self.may_s.is_none() && self.raised_s.is_some_and(|at_s| at_s >= self.end_s - 1e-6)
     }
 
-    /// Delay after the due moment, seconds.
+    /// Delay of the flag after the due moment, seconds.
     pub fn late_s(&self) -> Option<f64> {
         Some(self.raised_s? - self.due_s?)
     }
 }
 
-/// Trajectory of a dive, out and on again, with its samples.
+/// Trajectory and samples of a dive that goes out, and perhaps back and forward again.
 pub struct Journey {
     reached: Vec<Reached>,
-    /// Range of moments of the longest way back; empty at the end without one.
+    /// Indices of the longest backward motion in `reached`; an empty range at the end if the vehicle never turned
+    /// back.
     back: Range<usize>,
-    /// The wall at the end of the dive, and when the vehicle turned back.
+    /// The wall at the end of the dive. `turned` is the wall when the vehicle turned back.
     whole: Wall,
     turned: Option<Wall>,
     end_s: f64,
 }
 
 impl Journey {
-    /// Reach and samples of a dive.
+    /// Extracts reach and samples of a dive.
     pub fn of(dive: &Dive) -> Self {
         let reached = reached(dive);
         let (mut most, mut back, mut longest_m) = (0, reached.len()..reached.len(), WAY_BACK_M);
@@ -172,19 +175,20 @@ impl Journey {
         self.reached.get(self.back.start).map_or(f64::INFINITY, |reached| reached.at.as_secs_f64())
     }
 
-    /// Time at which it went forward again, seconds; infinite if never.
+    /// Time at which the vehicle went forward again after turning back, seconds; infinite if never.
     pub fn turned_on_s(&self) -> f64 {
         self.reached.get(self.back.end).map_or(f64::INFINITY, |reached| reached.at.as_secs_f64())
     }
 
-    /// Whether a flagged section had failed for good at that moment, by the samples so far. Later samples that fill
-    /// the circle because the vehicle swings back don't count.
+    /// Whether a flagged section had already failed for good when the flag was raised.
+    ///
+    /// Only samples up to that moment count. A vehicle that sways back may fill the circle later.
     pub fn was_due(&self, dive: &Dive, flag: &Flag, sd: f64) -> bool {
         let report = &dive.report;
         let section = report.sections.iter().find(|section| section.start_m >= flag.start_m);
         let Some((section, raised_s)) = section.zip(flag.raised_s) else { return false };
         let raised = MonoNs(math::round_to_i64(raised_s * 1e9).unsigned_abs());
-        // Several pings, because places and attitudes carry navigation noise.
+        // The maximum over several pings is used, because places and attitudes have navigation noise.
         let near = |ping: &&Ping| raised.since(ping.received).0.abs() <= EVERY.0;
         let poses = dive.pings.iter().filter(near).filter_map(|ping| ping.pose);
         let rear_m = poses.map(|pose| ends_m(dive, &pose)[0]).fold(f64::MIN, f64::max);
@@ -196,7 +200,7 @@ impl Journey {
         first_m.is_some_and(|first_m| first_m + radius_m - line_m <= rear_m)
     }
 
-    /// The flags of a dive. A fail is a hole that exceeds the target by `sd` standard deviations.
+    /// The flags of a dive. A section fails if its hole exceeds the target by `sd` standard deviations.
     pub fn flags(&self, dive: &Dive, sd: f64) -> Vec<Flag> {
         let target_m = dive.report.target_m;
         dive.report.sections.iter().map(|section| self.flag(target_m, section, sd)).collect()
@@ -206,7 +210,7 @@ impl Journey {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
         let due_m = |wall: &Wall, early_m: f64| {
-            // A tolerance that makes the flag earlier makes its due moment later.
+            // The tolerance has the opposite sign in the search for the earliest due moment.
             let near_m = if early_m > 0.0 { -NEAR_M } else { NEAR_M };
             let passed_m = all_passed_from_m(&self.reached) + near_m;
             Some(first_failing_m(wall, ends, radius_m, passed_m)? + radius_m - early_m)
@@ -223,7 +227,8 @@ impl Journey {
         let late_m = || {
             let raised_s = section.flagged_s?;
             let before = |reached: &&Reached| reached.at.as_secs_f64() <= raised_s;
-            // Right after a jump of reach or deviation, the tick limits how soon the flag can be raised.
+            // Right after a jump of the reach or the standard deviation, the tick limits how early the flag can be
+            // raised.
             let soon_s = 2.0 * EVERY.as_secs_f64();
             first(0.0).filter(|due_s| raised_s > due_s + soon_s)?;
             Some(self.reached.iter().take_while(before).last()?.rear_m - due_m(&self.whole, 0.0)?)

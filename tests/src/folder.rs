@@ -1,4 +1,4 @@
-//! The program under test, and a temporary folder for it that is removed after use.
+//! The program under test, and a temporary folder in which it runs. The folder is removed after use.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -13,8 +13,8 @@ const LONG_S: u32 = 100;
 
 /// The program under test, ready for arguments.
 pub fn program() -> Command {
-    // Cargo passes the path to tests that it runs. A test that runs alone, as in `tests/vm`, looks in cargo's target
-    // folder.
+    // Cargo passes the path to the tests that it runs. A test that runs without Cargo, as in `tests/vm`, searches
+    // Cargo's target folder.
     Command::new(std::env::var_os("CARGO_BIN_EXE_headrace_under_test").map_or_else(built, PathBuf::from))
 }
 
@@ -24,7 +24,8 @@ fn built() -> PathBuf {
     folder.join(format!("headrace_under_test{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// A new folder for one test, removed with its content. Commands run in it, so that messages contain bare file names.
+/// A new folder for one test, removed with its content. Commands run in this folder, so that their messages contain
+/// bare file names.
 pub struct Folder(PathBuf);
 
 /// Result of a command.
@@ -71,15 +72,17 @@ impl Folder {
         std::fs::read(self.path(name)).unwrap()
     }
 
-    /// Runs the binary in this folder.
+    /// Runs the program in this folder.
     pub fn headrace(&self, arguments: &[&str]) -> Answer {
         let output = program().args(arguments).current_dir(&self.0).output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
         Answer { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
     }
 
-    /// Repeats a live dive with these arguments of `run` until its report satisfies `is_enough`. A dive takes 3 s,
-    /// and longer on a busy machine. The log is `dive.mcap`. Returns the last dive's answer and report.
+    /// Repeats a live dive with these arguments of `run` until `is_enough` accepts its report.
+    ///
+    /// A dive takes 3 s, and longer on a busy machine. The log is `dive.mcap`. Returns the last answer and the last
+    /// report.
     pub fn dive_until(&self, arguments: &[&str], is_enough: impl Fn(&Value) -> bool) -> (Answer, Value) {
         let mut seconds = 3;
         loop {
@@ -101,7 +104,7 @@ impl Folder {
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     }
 
-    /// Records a replayed log of `vehicle.toml` as a live dive, as fast as possible. Returns the answer.
+    /// Records a replay of the log of `vehicle.toml` as a live dive, as fast as possible. Returns the answer.
     #[track_caller]
     pub fn record(&self, from: &str, to: &str, further: &[&str]) -> Answer {
         let arguments = ["run", "vehicle.toml", "--source", from, "--record", to, "--speed", "max"];
@@ -110,7 +113,7 @@ impl Folder {
         answer
     }
 
-    /// Checks that `scene.toml` is refused: exit code 2, these words, and no log.
+    /// Checks that `scene.toml` is refused with exit code 2 and these words, and that no log is written.
     #[track_caller]
     pub fn refuses_scene(&self, words: &[&str]) {
         let answer = self.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]);
@@ -118,7 +121,7 @@ impl Folder {
         for word in words {
             assert!(answer.stderr.contains(word), "{word:?} is not in {}", answer.stderr);
         }
-        assert!(!self.path("dive.mcap").exists(), "no log of a scene that is none");
+        assert!(!self.path("dive.mcap").exists(), "a refused scene leaves no log");
     }
 
     /// Exit code and report of `replay LOG --json` with further arguments.

@@ -7,15 +7,15 @@ use headrace_sensor::codec::Codec;
 use crate::faulty::{Fault, Wire};
 use crate::random::Random;
 
-/// Counts the good frames that a codec finds in a separate piece of bytes.
+/// Counts the good frames that a codec finds in some bytes.
 pub type Count = fn(&[u8]) -> u64;
 
-/// Good frames of an echosounder.
+/// Number of good frames of an echosounder.
 pub fn of_ping(bytes: &[u8]) -> u64 {
     counted(&mut PingCodec::default(), bytes)
 }
 
-/// Good frames of a profiling head.
+/// Number of good frames of a profiling head.
 pub fn of_head(bytes: &[u8]) -> u64 {
     counted(&mut ReturnCodec::new(Returns { model: Some(Model::Head881) }), bytes)
 }
@@ -26,7 +26,7 @@ fn counted(codec: &mut impl Codec, bytes: &[u8]) -> u64 {
     codec.counts().good_frames
 }
 
-/// A fault that changes bytes in transit. Not every change is detectable, because a head's returns have no checksum.
+/// A fault that changes bytes in transit. Some changes are undetectable, because returns of heads have no checksum.
 pub struct Garbled {
     random: Random,
     change: fn(&mut Random, &[u8]) -> Vec<u8>,
@@ -34,7 +34,7 @@ pub struct Garbled {
 }
 
 impl Garbled {
-    /// Passes all bytes through `change`; `count` counts the frames that survive.
+    /// Passes all bytes through `change`. `count` counts the frames that stay good.
     pub fn new(seed: u64, count: Count, change: fn(&mut Random, &[u8]) -> Vec<u8>) -> Self {
         Self { random: Random(seed), change, count }
     }
@@ -56,18 +56,18 @@ impl Fault for Garbled {
     }
 }
 
-/// Flips one bit in about one byte of a hundred.
+/// Flips one bit in about one byte out of a hundred.
 pub fn flipped(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     let flip = |byte: &u8| if random.one_in(100) { byte ^ (1 << (random.bits() % 8)) } else { *byte };
     bytes.iter().map(flip).collect()
 }
 
-/// Drops about one byte of a hundred.
+/// Drops about one byte out of a hundred.
 pub fn thinned(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     bytes.iter().copied().filter(|_| !random.one_in(100)).collect()
 }
 
-/// A fault from a function that is called with each frame and its number.
+/// A fault made of a function, which is called with the number and the bytes of each frame.
 pub struct EachFrame<F>(pub F);
 
 impl<F: FnMut(u64, &[u8], &mut Wire) + Send> Fault for EachFrame<F> {

@@ -1,4 +1,4 @@
-//! Dives whose placed pings are copied out of the loop, as input for coverage oracles.
+//! Dives whose placed pings are copied out of the loop, as input of coverage oracles.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use headrace_geometry::frames::{Mount, Pose};
@@ -21,7 +21,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::scenes;
 
-/// A return on the wall.
+/// A return with its place on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Chainage and arc length, m.
@@ -37,31 +37,31 @@ pub struct Ping {
     pub head: usize,
     /// Receive time of the ping.
     pub received: MonoNs,
-    /// Whether the head has started a new turn since its last ping.
+    /// Whether the head has started a new turn since the previous ping.
     pub new_sweep: bool,
-    /// Whether the head has moved here from its last ping in one step.
+    /// Whether the head has moved by exactly one step since the previous ping.
     pub single_step: bool,
     /// Pose of the vehicle, if known.
     pub pose: Option<Pose>,
-    /// Return accepted as wall and placed, if there is one.
+    /// The return, if it was accepted as wall and placed.
     pub sample: Option<Sample>,
-    /// Return not accepted as wall, if there is one.
+    /// The return, if it was not accepted as wall.
     pub doubtful: Option<Sample>,
 }
 
-/// Pings and report of a dive, and its configuration.
+/// Pings, report and configuration of a dive.
 pub struct Dive {
     /// Pings in the order in which the loop placed them.
     pub pings: Vec<Ping>,
     /// Report of the dive.
     pub report: Report,
-    /// Cross-section as the loop knows it.
+    /// Cross-section in the loop's configuration.
     pub profile: Profile,
     /// Mounts of the heads, by number.
     pub mounts: Vec<Mount>,
-    /// Range of each head in the site's water, m.
+    /// Range of each head at the site's speed of sound, m.
     pub ranges_m: Vec<f64>,
-    /// Longest time of a turn of any head, seconds.
+    /// Turn time of the slowest head, seconds.
     pub turn_s: f64,
 }
 
@@ -80,11 +80,11 @@ impl Dive {
 #[derive(Resource, Default)]
 struct Seen {
     pings: Vec<Ping>,
-    /// Place of each return, wall or doubtful; the loop may decide later which.
+    /// Place of every return. The loop may decide later whether a return is wall or doubtful.
     placed: Vec<Option<[f64; 3]>>,
 }
 
-/// Observer that copies placed pings and changes nothing.
+/// Observer that copies the placed pings and changes nothing.
 struct Watch;
 
 impl Plugin for Watch {
@@ -142,7 +142,7 @@ fn watch(
     }
 }
 
-/// Simulates and replays a scene of these two files, in ticks of 20 ms.
+/// Simulates the scene of these two files and replays it in ticks of 20 ms.
 pub fn dive(vehicle: &str, scene: &str) -> Dive {
     dive_in_ticks(vehicle, scene, Pace::default().tick)
 }
@@ -153,14 +153,15 @@ pub fn dive_in_ticks(vehicle: &str, scene: &str, tick: DurNs) -> Dive {
     watched(&scene, &scene.vehicle, scene.vehicle.mission(), Pace { tick, ..Pace::default() })
 }
 
-/// As [`dive`], with a loop whose profile starts its arc length elsewhere.
+/// As [`dive`], but the arc length of the loop's profile starts at another place.
 pub fn dive_with_profile(vehicle: &str, scene: &str, profile: Profile) -> Dive {
     let scene = parse(vehicle, "", scene);
     watched(&scene, &scene.vehicle, Mission { profile, ..scene.vehicle.mission() }, Pace::default())
 }
 
-/// Simulates a scene in one polygon with one vehicle; the loop uses another vehicle and polygon. Polygons have a
-/// corner `y_m,z_m` on each line.
+/// Simulates a scene with one vehicle and one polygon. The loop uses another vehicle file and another polygon.
+///
+/// A polygon has one corner `y_m,z_m` per line.
 pub fn dive_believing(vehicle: [&str; 2], polygon: [&str; 2], scene: &str) -> Dive {
     let [true_scene, believed] = [0, 1].map(|k| parse(vehicle[k], polygon[k], scene));
     watched(&true_scene, &believed.vehicle, believed.vehicle.mission(), Pace::default())

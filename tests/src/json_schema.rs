@@ -1,10 +1,11 @@
-//! A checker for the part of JSON Schema (2020-12) that this repository's schemas use; unknown keywords are errors.
+//! Checks values against the part of JSON Schema (2020-12) that this repository's schemas use. Unknown keywords are
+//! errors.
 //!
-//! A crate for it would add a third to the packages that the workspace builds.
+//! A crate for JSON Schema would enlarge the number of packages in the workspace's build by a third.
 
 use serde_json::{Map, Value};
 
-/// Differences between `value` and the root schema.
+/// Differences between `value` and the root schema, as text.
 pub fn faults(schema: &Value, value: &Value) -> Vec<String> {
     let mut faults = Vec::new();
     Checker { root: schema, faults: &mut faults }.check("", schema, value);
@@ -39,7 +40,7 @@ impl Checker<'_> {
                     let fits = |one: &&Value| faults(one, value).is_empty();
                     wanted.as_array().unwrap().iter().filter(fits).count() == 1
                 }
-                // The decoded content is left to the test.
+                // Only the encoding is checked here, not the decoded content.
                 "contentEncoding" => wanted == "base64" && base64(value.as_str().unwrap()).is_some(),
                 "const" => value == wanted,
                 "enum" => wanted.as_array().unwrap().contains(value),

@@ -1,4 +1,5 @@
-//! A client of the page over real sockets, with its decoded state. Its decoder shares no code with the server.
+//! A client of the page over real sockets, which decodes the page's state. The decoder shares no code with the
+//! server.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -21,9 +22,9 @@ const SCHEMA: &str = include_str!("../../docs/reference/page-feed.schema.json");
 /// A running program with a page, killed when it goes out of scope.
 pub struct Serving {
     child: Child,
-    /// Host and port of its page.
+    /// Host and port of the page.
     pub address: String,
-    /// Its standard input.
+    /// Standard input of the program.
     pub stdin: Option<ChildStdin>,
     rest: mpsc::Receiver<String>,
 }
@@ -35,7 +36,7 @@ impl Serving {
         command.args(arguments).current_dir(folder.path(""));
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
-        #[expect(clippy::disallowed_types, reason = "read to its end by a test, without a loop")]
+        #[expect(clippy::disallowed_types, reason = "a test reads it to its end, without a loop")]
         let (sender, lines): (mpsc::Sender<String>, _) = mpsc::channel();
         let streams: [Box<dyn Read + Send>; 2] =
             [Box::new(child.stdout.take().unwrap()), Box::new(child.stderr.take().unwrap())];
@@ -63,13 +64,13 @@ impl Serving {
         Self { child, address, stdin, rest: lines }
     }
 
-    /// Sends a signal.
+    /// Sends a signal to the program.
     pub fn signal(&self, signal: rustix::process::Signal) {
         let pid = rustix::process::Pid::from_child(&self.child);
         rustix::process::kill_process(pid, signal).unwrap();
     }
 
-    /// Waits for its end; returns exit code and output.
+    /// Waits for the program's end; returns exit code and output.
     pub fn end(mut self) -> (Option<i32>, String) {
         let code = self.child.wait().unwrap().code();
         (code, self.rest.iter().collect::<Vec<_>>().join("\n"))
@@ -80,7 +81,7 @@ impl Serving {
         ask(&self.address, method, path, headers, body)
     }
 
-    /// Body of the response to a request, which must have status 200.
+    /// Sends a request, which must succeed with status 200. Returns the body of the response.
     pub fn get(&self, path: &str) -> Vec<u8> {
         let bytes = answer_of(&self.address, "GET", path, &[], &[]);
         assert!(bytes.starts_with(b"HTTP/1.1 200"), "{path}: {}", String::from_utf8_lossy(&bytes));
@@ -119,7 +120,7 @@ fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[
         format!("Host: {address}\r\n")
     };
     let further = headers.iter().fold(String::new(), |all, header| all + header + "\r\n");
-    // A test may state a length in the headers that differs from the body's.
+    // A test may give a length in its headers that differs from the body's length.
     let states =
         headers.iter().any(|header| header.starts_with("Content-Length:") || header.contains("chunked"));
     let length = if states { String::new() } else { format!("Content-Length: {}\r\n", body.len()) };
@@ -130,18 +131,18 @@ fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[
     bytes
 }
 
-/// A section as received.
+/// A section as the client received it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenSection {
     /// 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
     pub verdict: u8,
-    /// Verdict for another target; `None` without one.
+    /// Verdict for the second target; `None` without a second target.
     pub compared: Option<u8>,
     /// Number of the cause.
     pub cause: u8,
     /// Diameter of the hole, m.
     pub hole_m: f32,
-    /// Bit set of the covered parts.
+    /// Bit set of the covered parts of the section.
     pub seen: u64,
 }
 
@@ -154,11 +155,11 @@ pub struct Viewer {
     pub sections: BTreeMap<i32, SeenSection>,
     /// Number of samples received.
     pub samples: u64,
-    /// Number of section frames received, and of sections in them.
+    /// Number of section frames received, and number of sections in these frames.
     pub section_frames: (u64, u64),
     /// Last state.
     pub state: Value,
-    /// Last list of alerts, with all later changes.
+    /// Last list of alerts, updated by all later changes.
     pub alerts: BTreeMap<u64, Value>,
     /// Notes.
     pub notes: Vec<Value>,
@@ -170,7 +171,7 @@ pub struct Viewer {
     schema: Value,
 }
 
-/// Differences between a text message and the definition of its type.
+/// Differences between a text message and the schema of its type.
 fn faults(schema: &Value, text: &Value) -> Vec<String> {
     let of_type = schema["anyOf"].as_array().unwrap().iter().find(|one| {
         let definition = one["$ref"].as_str().unwrap().strip_prefix('#').unwrap();
@@ -183,7 +184,7 @@ fn faults(schema: &Value, text: &Value) -> Vec<String> {
 }
 
 impl Viewer {
-    /// Connects; `query` begins with `?` or is empty.
+    /// Connects with this query, which begins with `?` or is empty.
     pub fn connect(
         serving: &Serving,
         query: &str,
@@ -225,26 +226,26 @@ impl Viewer {
         })
     }
 
-    /// Reads until `holds` returns true, which must happen before the connection ends.
+    /// Reads until `holds` returns true. Panics if the connection ends or the time is over before that.
     #[expect(clippy::disallowed_methods, reason = "the wait would never end")]
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) {
         let began = std::time::Instant::now();
         while !holds(self) {
-            assert!(began.elapsed() < WITHIN, "{what}: not within {WITHIN:?}; state {}", self.state);
+            assert!(began.elapsed() < WITHIN, "{what}: not reached within {WITHIN:?}; state {}", self.state);
             if let Err(why) = self.read() {
                 panic!("{what}: {why}; last {:?}", self.others.last());
             }
         }
     }
 
-    /// Reads until a message of this type.
+    /// Reads until a message of this type arrives.
     pub fn until_type(&mut self, kind: &str) -> Value {
         let before = self.others.len();
         self.until(kind, |viewer| viewer.others[before..].iter().any(|other| other["type"] == kind));
         self.others[before..].iter().find(|other| other["type"] == kind).unwrap().clone()
     }
 
-    /// Reads to the end of the connection; returns code and reason of its close.
+    /// Reads until the connection is closed; returns code and reason of the close frame.
     pub fn until_closed(&mut self) -> Option<(u16, String)> {
         loop {
             match self.socket.read() {
@@ -257,7 +258,7 @@ impl Viewer {
         }
     }
 
-    /// Reads until the dive has begun; a replay can be controlled only from then on.
+    /// Reads until the dive has begun; before that, a replay can't be controlled.
     pub fn until_begun(&mut self) {
         self.until("a state", |viewer| !viewer.state.is_null());
     }
@@ -279,7 +280,7 @@ impl Viewer {
         self.socket.send(message)
     }
 
-    /// Query with which a lost connection resumes.
+    /// Query that resumes a lost connection.
     pub fn resume(&self) -> String {
         format!("?instance={}&since={}", self.hello["instance"].as_str().unwrap(), self.seq)
     }
@@ -350,7 +351,7 @@ impl Viewer {
     }
 }
 
-/// An acknowledgement of all alerts that require one.
+/// Command that acknowledges all alerts that require it.
 pub fn acknowledge_all(by: &str) -> Value {
     json!({"do": "acknowledge", "alert": 0, "by": by})
 }

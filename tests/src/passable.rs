@@ -1,8 +1,9 @@
 //! Finds the largest speed at which a vehicle's sections truly pass, to compare it with the advised and planned
 //! speeds.
 //!
-//! A dive passes if nearly all of its sections have the verdict pass, and no circle without a true sample in them
-//! exceeds the target. The comparison uses `truth`, which shares nothing with the program's coverage or advice.
+//! A dive passes if nearly all of its sections have the verdict pass, and if no circle without true samples in these
+//! sections exceeds the target. The comparison uses `truth`, which shares nothing with the program's coverage or
+//! advice.
 
 use headrace_monitor::advice_log::AdviceEntry;
 use headrace_monitor::messages::Notice;
@@ -15,60 +16,61 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// Start of a dive that isn't judged, s: the filter learns an inertial unit's biases.
+/// Start of a dive that isn't judged, s. In this time, the filter learns the biases of the inertial unit.
 const SETTLES_S: f64 = 100.0;
 /// Length that is judged, m.
 const JUDGED_M: f64 = 8.0;
-/// Share of sections that must pass, as for a dive at the planned speed. None of them may pass falsely.
+/// Fraction of sections that must pass, as in a dive at the planned speed. None of these sections may pass falsely.
 const PASSING: f64 = 0.95;
-/// One section in this many may fail.
+/// One section out of this many may fail.
 const FAILING: usize = 20;
-/// Speeds that are tried, as shares above and below a speed.
+/// Speeds tried in the search, as multiples of the first speed.
 const ABOVE: [f64; 9] = [1.02, 1.04, 1.06, 1.08, 1.1, 1.125, 1.15, 1.2, 1.25];
 const BELOW: [f64; 8] = [0.98, 0.96, 0.94, 0.92, 0.9, 0.87, 0.83, 0.75];
 
 /// A vehicle on a dive.
 #[derive(Debug, Clone)]
 pub struct Outing {
-    /// Vehicle, layout and file.
+    /// The vehicle with its layout and file.
     pub vehicle: Vehicle,
-    /// Mode of its heads.
+    /// Mode of the heads.
     pub mode: &'static str,
     /// Target T, m.
     pub target_m: f64,
-    /// Effects in addition to those of data sheets.
+    /// Effects in addition to those from data sheets.
     pub effects: String,
     /// Seed of the dive.
     pub seed: u64,
     /// Chainage of the start, m.
     pub start_m: f64,
-    /// Shares of the planned speed: for the phases of the heads, and for driving before advice.
+    /// Fraction of the planned speed for which the heads are in phase, and at which the vehicle drives before the
+    /// first advice.
     pub planned_share: f64,
 }
 
 /// Result of a dive.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// Share of the judged sections that pass, 0 to 1.
+    /// Fraction of the judged sections that pass, 0 to 1.
     pub passing: f64,
-    /// Shares of the judged sections with the verdict can't say, and of those that fail.
+    /// Fraction of the judged sections with the verdict can't say.
     pub unsure: f64,
     /// Number of judged sections that pass with a true hole over the target.
     pub falsely: usize,
-    /// Largest D_true over T of the judged sections.
+    /// Largest D_true / T among the judged sections.
     pub true_share: f64,
     /// Advice updates in the judged part.
     pub beats: Vec<AdviceEntry>,
 }
 
-/// An advised speed and the true largest speed.
+/// An advised speed with the true largest speed.
 #[derive(Debug, Clone)]
 pub struct Compared {
     /// Planned speed, m/s.
     pub plan_mps: f64,
     /// Advised speed while driving at the planned speed, m/s.
     pub advised_mps: f64,
-    /// Largest speed near it at which sections truly pass, m/s; `None` if there is none.
+    /// Largest speed near the advised one at which sections truly pass, m/s; `None` if there is none.
     pub true_mps: Option<f64>,
     /// The dive at the planned speed.
     pub planned: Outcome,
@@ -77,12 +79,12 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// Speed advised at the planned speed, over the true largest speed.
+    /// Ratio of the speed advised at the planned speed to the true largest speed.
     pub fn ratio(&self) -> f64 {
         self.over_true(self.advised_mps)
     }
 
-    /// Speed advised while following the advice, over the true largest speed.
+    /// Ratio of the speed advised while the pilot follows the advice to the true largest speed.
     pub fn followed_ratio(&self) -> f64 {
         self.over_true(self.followed.told_mps())
     }
@@ -98,23 +100,25 @@ impl Outcome {
         self.passing >= PASSING && self.falsely == 0
     }
 
-    /// Median of a value over the updates.
+    /// Median of a value over all updates.
     pub fn median(&self, of: impl Fn(&AdviceEntry) -> f64) -> f64 {
         let mut all: Vec<f64> = self.beats.iter().map(of).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
-    /// Speed that stays within the advice at the share of updates that equals the share of sections that must pass,
-    /// m/s. A swaying vehicle gets lower advice at times, and a vehicle at constant speed can't follow that.
+    /// Largest constant speed that follows the advice often enough, m/s. The share of updates in which it exceeds the
+    /// advice is the share of sections that may fail.
+    ///
+    /// A swaying vehicle temporarily gets lower advice, which a constant speed can't follow.
     pub fn told_mps(&self) -> f64 {
         let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
     }
 
-    /// Changes of the displayed speed per minute. Durations below half a minute count as half a minute, so that a
-    /// single change doesn't count as many.
+    /// Changes of the displayed speed per minute. A dive shorter than half a minute counts as half a minute long, so
+    /// that a single change doesn't give a high rate.
     pub fn changes_a_minute(&self) -> f64 {
         let changed = |pair: &[AdviceEntry]| {
             (pair[0].advice.v_max_mps - pair[1].advice.v_max_mps).abs() > 1e-6
@@ -126,7 +130,7 @@ impl Outcome {
 }
 
 impl Outing {
-    /// A steady vehicle of the field table, with heads in phase for 0.95 of the planned speed.
+    /// A steady vehicle of the field table, with heads in phase for 0.95 times the planned speed.
     pub fn steady(vehicle: Vehicle, seed: u64) -> Self {
         Self {
             vehicle,
@@ -139,7 +143,8 @@ impl Outing {
         }
     }
 
-    /// The outing of a seed: vehicles in rotation, every other one swaying, the rest drawn.
+    /// The outing of a seed. Vehicles rotate with the seed, every second round of vehicles sways, and all other
+    /// values are drawn.
     pub fn drawn(seed: u64) -> Self {
         let mut draw = Draw::new(seed ^ 0x5eed_ad71);
         let turn = usize::try_from(seed).unwrap();
@@ -166,7 +171,7 @@ impl Outing {
         }
     }
 
-    /// Result of a dive at `speed_mps` with heads in phase for `planned_mps`.
+    /// Result of a dive at `speed_mps` with heads that are in phase for `planned_mps`.
     pub fn dive(&self, planned_mps: f64, speed_mps: f64) -> Outcome {
         let ends_m = 1.2 * self.target_m + 2.0;
         let settles_m = (SETTLES_S * speed_mps).max(ends_m);
@@ -258,7 +263,7 @@ impl Outing {
         lines.collect::<Vec<_>>().join("\n")
     }
 
-    /// A scene of `length_m` at `speed_mps`, with heads in phase for `planned_mps`.
+    /// A scene of `length_m` at `speed_mps`, with heads that are in phase for `planned_mps`.
     pub fn scene(&self, planned_mps: f64, speed_mps: f64, length_m: f64) -> Scene {
         let vehicle = self.vehicle_text(planned_mps);
         let load = |_: &str| Ok(vehicle.clone().into_bytes());

@@ -1,7 +1,7 @@
 //! A driver with a longer silence timeout, for devices on a pseudoterminal.
 //!
-//! A kernel thread moves the bytes of a pseudoterminal. On a busy machine it was seen ready but not running for up to
-//! 16 s, with four busy loops on two cores.
+//! A kernel thread moves the bytes of a pseudoterminal. On a busy machine this thread can wait long for CPU time: up
+//! to 16 s with four busy loops on two cores.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
@@ -9,7 +9,7 @@ use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 /// Longer than any stall of a pseudoterminal.
 const SILENCE_TIMEOUT: DurNs = DurNs::from_millis(120_000);
 
-/// A driver equal to the one inside, except for its silence timeout.
+/// A driver that differs from the inner one only in the silence timeout.
 pub(crate) struct Patient(pub(crate) Box<dyn Driver>);
 
 impl Driver for Patient {

@@ -5,7 +5,8 @@ use headrace_sampling::plan::Planner;
 use headrace_simulator::position_error_model;
 use headrace_vehicle::VehicleConfig;
 
-/// Planned speed of a vehicle in a mode, in the middle of its tunnel, with its own position errors, m/s.
+/// Planned speed of a vehicle in a mode, m/s. The plan is for the middle of the tunnel, with the vehicle's own
+/// position errors.
 pub fn planned_mps(vehicle: &VehicleConfig, text: &str, mode: &str) -> f64 {
     let load = |_: &str| Ok(text.as_bytes().to_vec());
     let errors =
@@ -13,6 +14,6 @@ pub fn planned_mps(vehicle: &VehicleConfig, text: &str, mode: &str) -> f64 {
             .unwrap();
     let planner = Planner::new(vehicle.inspection().unwrap()).unwrap().with_errors(errors);
     let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();
-    // A plan is printed in millimetres per second.
+    // `plan` prints speeds in millimetres per second, rounded down.
     math::floor_to_i64(planner.v_max_mps(number, vehicle.target_m).unwrap_or(0.0) * 1e3) as f64 * 1e-3
 }

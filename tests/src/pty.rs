@@ -1,4 +1,4 @@
-//! A program on a pseudoterminal of a given width, with its output.
+//! A program on a pseudoterminal of a given width, and the program's output.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write as _};
@@ -12,7 +12,7 @@ use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{Winsize, tcgetwinsize, tcsetwinsize};
 
-/// A terminal that only the test reads.
+/// A terminal that nobody reads except the test.
 pub struct Terminal {
     reader: File,
     end: File,
@@ -30,7 +30,7 @@ impl Terminal {
         Self { reader: File::from(master), end }
     }
 
-    /// The program's end.
+    /// The end that the program uses.
     pub fn end(&self) -> File {
         self.end.try_clone().unwrap()
     }
@@ -47,9 +47,10 @@ impl Terminal {
         }
     }
 
-    /// Writes to the program's end until the terminal accepts no more. Later writes block.
+    /// Fills the terminal's buffer until no more bytes are accepted. Later writes of the program block.
     pub fn fill(&self) {
-        // A separate open file: non-blocking mode belongs to the open file, not to the terminal.
+        // The end is opened again, because non-blocking mode belongs to the open file and must not affect the
+        // program.
         let name = format!("/proc/self/fd/{}", self.end.as_raw_fd());
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK;
         let mut end = File::from(rustix::fs::open(name, flags, Mode::empty()).unwrap());
@@ -77,13 +78,13 @@ impl OnTerminal {
         command.env("TERM", "xterm").env_remove("NO_COLOR");
         command.stdin(slave.try_clone().unwrap()).stderr(slave.try_clone().unwrap()).stdout(slave);
         let child = command.spawn().unwrap();
-        // The command holds copies of the terminal's end.
+        // The command still holds copies of the terminal's end.
         drop(command);
         let (sender, pieces) = sync_channel(1 << 10);
         let mut master = File::from(master);
         std::thread::spawn(move || {
             let mut bytes = [0; 4096];
-            // Reading fails once nobody holds the other end open.
+            // Reading fails as soon as no process has the other end open.
             while let Ok(read) = master.read(&mut bytes) {
                 if read == 0 || sender.send(bytes[..read].to_vec()).is_err() {
                     return;
@@ -93,8 +94,8 @@ impl OnTerminal {
         Self { child, pieces, written: Vec::new() }
     }
 
-    /// Waits until the output contains `text` after index `from`; returns the index behind it. Panics after a minute
-    /// without output.
+    /// Waits until the output contains `text` after index `from`. Returns the index after the text. Panics after a
+    /// minute without output.
     pub fn wait_for(&mut self, text: &str, from: usize) -> usize {
         loop {
             let written = String::from_utf8_lossy(&self.written[from..]).into_owned();
@@ -108,7 +109,7 @@ impl OnTerminal {
         }
     }
 
-    /// Waits for its end; returns all output.
+    /// Waits for the program's end; returns all output.
     pub fn all(mut self) -> String {
         while let Ok(piece) = self.pieces.recv_timeout(Duration::from_mins(2)) {
             self.written.extend(piece);
@@ -121,7 +122,7 @@ impl OnTerminal {
         String::from_utf8_lossy(&self.written).into_owned()
     }
 
-    /// Its process id.
+    /// Process id of the program.
     pub fn id(&self) -> u32 {
         self.child.id()
     }
@@ -134,7 +135,7 @@ impl Drop for OnTerminal {
     }
 }
 
-/// The lines as displayed: without colours, with every version of an overwritten line.
+/// The lines as displayed, without colours. An overwritten line appears once for each of its versions.
 pub fn shown_lines(written: &str) -> Vec<String> {
     let mut plain = String::new();
     let mut rest = written;

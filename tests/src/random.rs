@@ -21,7 +21,7 @@ impl Random {
         self.bits().is_multiple_of(count)
     }
 
-    /// Below `limit`; 0 where that is 0.
+    /// A random number below `limit`; 0 if `limit` is 0.
     pub fn below(&mut self, limit: usize) -> usize {
         usize::try_from((self.bits() >> 16) % (limit.max(1) as u64)).unwrap()
     }

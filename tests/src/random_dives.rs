@@ -11,15 +11,15 @@ pub enum Kind {
     Ideal,
     /// Noise on everything, a drifting pilot, missing and false returns.
     Noisy,
-    /// Heads that go back and forth in sectors.
+    /// Heads that sweep back and forth in sectors.
     Sectors,
-    /// Heads that hide the wall from each other, and a hull.
+    /// A hull and heads that hide the wall from each other.
     Occluded,
-    /// Forward, back, forward.
+    /// A vehicle that goes forward, back, and forward again.
     Reversing,
     /// A vehicle that is stationary for a while.
     Parked,
-    /// Fast, with long gaps in the returns and heads that stall.
+    /// A fast vehicle, with long gaps in the returns and heads that stall.
     Sparse,
     /// A cavern whose ends lie beyond the range of every head.
     Wide,
@@ -45,7 +45,7 @@ impl Draw {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }
 
-    /// From 0 to below 1.
+    /// A random number from 0 to below 1.
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -54,17 +54,17 @@ impl Draw {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// From `from` to below `to`.
+    /// A random number from `from` to below `to`.
     pub fn between(&mut self, from: f64, to: f64) -> f64 {
         from + (to - from) * self.unit()
     }
 
-    /// A whole number from 0 to below `count`.
+    /// A random whole number from 0 to below `count`.
     pub fn below(&mut self, count: usize) -> usize {
         usize::try_from(math::floor_to_i64(self.unit() * count as f64)).unwrap()
     }
 
-    /// One of the values.
+    /// One of the values, at random.
     pub fn one_of<T: Copy>(&mut self, values: &[T]) -> T {
         values[self.below(values.len())]
     }
@@ -83,8 +83,8 @@ pub struct Seeded {
     pub scene: String,
 }
 
-/// Table of the tunnel, a range setting that reaches its walls, and the largest offset of a vehicle from the centre
-/// line, m.
+/// Three results: the tunnel's table, a range setting that reaches the walls, and the largest offset of a vehicle
+/// from the centre line, m.
 fn tunnel(kind: Kind, draw: &mut Draw) -> (String, u32, f64) {
     if kind == Kind::Wide {
         let width_m = draw.between(30.0, 36.0);
@@ -125,7 +125,7 @@ fn vehicle(kind: Kind, draw: &mut Draw, speed_mps: f64) -> (String, f64) {
         Kind::Sparse => draw.one_of(&["slow", "medium"]),
         _ => draw.one_of(&["medium", "fast", "faster", "fastest", "fastest"]),
     };
-    // Heads together, one behind the other, or side by side with some of them facing aft.
+    // Heads are at one place, one behind the other, or side by side. Some of the heads side by side face aft.
     let places = if kind == Kind::Occluded { 2 } else { draw.below(3) };
     for head in 0..heads {
         let place = match places {
@@ -148,7 +148,7 @@ fn vehicle(kind: Kind, draw: &mut Draw, speed_mps: f64) -> (String, f64) {
     (text, aside_m)
 }
 
-/// Sensors that give a position.
+/// Sensors for the position.
 pub const SENSORS: &str = r#"[[sensors]]
 id = "left"
 plugin = "ping1d"

@@ -1,4 +1,4 @@
-//! A dive on real ports in one process: the loop with its supervisor, and emulated devices whose lines can fail.
+//! A dive on real ports in one process: the loop with its supervisor, and emulated devices on lines that can fail.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ use crate::drops;
 use crate::faulty::{Control, End, Fault, Faulty};
 use crate::patient::Patient;
 
-/// Longest wait before a test counts as hung, also on a busy machine.
+/// Longest wait, also on a busy machine; a test that takes longer hangs.
 const LONG: DurNs = DurNs::from_millis(300_000);
 
 /// Vehicle file without its sensors.
@@ -40,20 +40,20 @@ radius_m = 3
 length_m = 20
 "#;
 
-/// A head whose turn takes some seconds.
+/// A head with a turn time of some seconds.
 pub const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\n";
 /// An echosounder that is polled twenty times a second.
 pub const PING: &str = "plugin = \"ping1d\"\ninterval_ms = 50\n";
-/// A counter that reports by UDP.
+/// A cable counter that reports by UDP.
 pub const COUNTER: &str = "plugin = \"tether_hid\"\ncounts_per_metre = 2000\nrate_hz = 50\n";
 /// A depth sensor on a bus.
 pub const DEPTH: &str = "plugin = \"bar100\"\n";
 
-/// A sensor of a rig: its table in the vehicle file, its device, and the fault of its line.
+/// A sensor of a rig, with a table in the vehicle file, a device, and a fault of the line.
 pub struct Sensor {
     /// Table of the sensor, without id and connect.
     pub text: &'static str,
-    /// End of the device.
+    /// Device's end of the line.
     pub end: End,
     /// Fault of the line.
     pub fault: Box<dyn Fault>,
@@ -68,7 +68,7 @@ pub struct View {
     pub whole: Vec<u64>,
     /// Last status of each sensor.
     pub phases: Vec<Option<Phase>>,
-    /// Status texts of each sensor, in order and without repetition.
+    /// Status texts of each sensor, in order and without repetitions.
     pub said: Vec<Vec<String>>,
 }
 
@@ -95,12 +95,12 @@ pub struct Ended {
 }
 
 impl Rig {
-    /// Starts a rig. All devices are plugged in except those whose end is absent.
+    /// Starts a rig. All devices are plugged in at first, except those with an absent end.
     pub fn new(sensors: Vec<Sensor>) -> Self {
         Self::recorded(sensors, None)
     }
 
-    /// As [`Rig::new`], recorded to a new file.
+    /// As [`Rig::new`]; records the dive to a new file.
     pub fn recorded(sensors: Vec<Sensor>, log: Option<&Path>) -> Self {
         let places: Vec<String> = sensors.iter().map(|sensor| sensor.end.connect().to_string()).collect();
         let mut text = HEADING.to_owned();
@@ -146,17 +146,17 @@ impl Rig {
         Self { dive, supervisor, devices, on, view, places, recorded }
     }
 
-    /// Controls of a device, for instance to unplug it.
+    /// Controls of a device, with which a test can for instance unplug it.
     pub fn control(&self, number: usize) -> &Control {
         self.devices[self.on[number]].control()
     }
 
-    /// View of the dive at the last update.
+    /// View of the dive at the latest update.
     pub fn view(&self) -> &View {
         &self.view
     }
 
-    /// Runs the dive until `condition` holds; returns the view.
+    /// Runs the dive until `condition` is true; returns the view.
     #[track_caller]
     pub fn until(&mut self, what: &str, condition: impl Fn(&View) -> bool) -> View {
         let Self { dive, supervisor, devices, on, view, places, .. } = self;
@@ -168,11 +168,11 @@ impl Rig {
             met.set(condition(&view));
         });
         let view = view.into_inner();
-        assert!(met.get(), "within {LONG:?}, {what}: {view:#?}");
+        assert!(met.get(), "{what}: not reached within {LONG:?}: {view:#?}");
         view.clone()
     }
 
-    /// Runs until a sensor has `more` additional good frames.
+    /// Runs until the number of good frames of a sensor has grown by `more`.
     #[track_caller]
     pub fn more(&mut self, number: usize, more: u64) -> View {
         let from = self.view.good[number];
@@ -187,13 +187,13 @@ impl Rig {
         })
     }
 
-    /// Silences all devices, waits until every whole frame has arrived, and ends the dive.
+    /// Silences all devices, waits for the arrival of every frame that was sent whole, and ends the dive.
     #[track_caller]
     pub fn end(self) -> Ended {
         self.end_but(None)
     }
 
-    /// As [`Rig::end`], without waiting for one sensor that may have lost frames at a full ring.
+    /// As [`Rig::end`], but doesn't wait for one sensor, which may have lost frames at a full ring.
     #[track_caller]
     pub fn end_but(mut self, overrun: Option<usize>) -> Ended {
         for device in &self.devices {
@@ -221,7 +221,7 @@ impl Rig {
 }
 
 impl Ended {
-    /// Checks that every sensor used every frame that was sent whole, and nothing else.
+    /// Checks that every sensor used exactly the frames that its device sent whole.
     #[track_caller]
     pub fn all_used(&self) {
         let Self { view, lines, .. } = self;
@@ -229,14 +229,14 @@ impl Ended {
         assert!(lines.iter().all(|line| line.dropped == 0), "{lines:#?}");
     }
 
-    /// Checks that this sensor had no trouble.
+    /// Checks that this sensor had no fault and no loss.
     #[track_caller]
     pub fn untroubled(&self, number: usize) {
         let (line, said) = (&self.lines[number], &self.view.said[number]);
         assert_eq!((line.opened, line.lost, line.dropped), (1, 0, 0), "{line:?} {said:?}");
         assert_eq!(self.view.good[number], self.view.whole[number]);
         assert_eq!(self.report.sources[number].frames, self.view.whole[number]);
-        // On a busy machine its line may be looked at before its first frame has come.
+        // On a busy machine, the first status may precede the first frame.
         let after_opening =
             said.strip_prefix(&["silent: the line is open, but no frame has arrived yet".to_owned()]);
         assert_eq!(after_opening.unwrap_or(said), ["running"], "the healthy sensor");
@@ -252,7 +252,8 @@ impl View {
         places: &[String],
     ) {
         let (devices, on) = devices;
-        // Count sent frames first: received frames are counted later, so they can't be fewer by chance.
+        // Sent frames are counted before received ones. So a frame that arrives in
+        // between can't count as sent only.
         self.whole = on.iter().map(|line| devices[*line].control().whole()).collect();
         self.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
         while let Some(status) = supervisor.next_status() {
@@ -262,7 +263,7 @@ impl View {
     }
 }
 
-/// Replaces addresses chosen by the system with neutral words.
+/// Replaces addresses chosen by the system with fixed words.
 fn neutral(words: &str, places: &[String]) -> String {
     let mut words = words.to_owned();
     for place in places {
@@ -302,7 +303,7 @@ fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, O
     (app.arm(vehicle.navigation()).unwrap(), handle)
 }
 
-/// The emulated device of a sensor, for a host in another process.
+/// The emulated device of a sensor, for a dive in another process.
 pub fn emulated(text: &str) -> Emulated {
     let text = format!("{HEADING}\n[[sensors]]\nid = \"s0\"\n{text}");
     let document = Document::new("vehicle.toml", &text);
@@ -312,7 +313,7 @@ pub fn emulated(text: &str) -> Emulated {
     vehicle.sensors[0].emulator(&EmulatorSetup { start, head, site: vehicle.site, polled: false })
 }
 
-/// Digest of a replay of this log, which must report this number of dropped packets and no other loss.
+/// Replays this log and returns its digest. The replay must report this number of dropped packets and no other loss.
 fn replayed(log: &Path, text: &str, dropped: u64) -> u64 {
     let document = Document::new("vehicle.toml", text);
     let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();

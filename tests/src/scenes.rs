@@ -7,29 +7,29 @@ use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
 use headrace_simulator::{FileLoader, Scene, Simulation};
 
-/// A file of `deploy/vehicles`.
+/// Content of a file in `deploy/vehicles`.
 pub fn vehicle_file(name: &str) -> Result<Vec<u8>, String> {
     let folder = crate::root().join("deploy/vehicles");
     std::fs::read(folder.join(name)).map_err(|error| error.to_string())
 }
 
-/// A scene of a shipped vehicle.
+/// Parses a scene of a shipped vehicle.
 pub fn scene(text: &str) -> Scene {
     scene_from(text, &vehicle_file)
 }
 
-/// A scene whose files come from `load`.
+/// Parses a scene; its files come from `load`.
 pub fn scene_from(text: &str, load: FileLoader<'_>) -> Scene {
     seeded(text, load, None)
 }
 
-/// A scene with another seed, if given.
+/// Parses a scene and replaces its seed, if one is given.
 pub fn seeded(text: &str, load: FileLoader<'_>, seed: Option<u64>) -> Scene {
     let scene = Scene::parse(Document::new("scene.toml", text), &headrace::devices::KINDS, load, seed);
     scene.unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// Report of the loop for a scene's dive.
+/// Simulates a scene and returns the loop's report.
 pub fn report(scene: &Scene) -> Report {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

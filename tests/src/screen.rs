@@ -17,7 +17,7 @@ use rustix::termios::{Winsize, tcsetwinsize};
 
 use crate::{Folder, program};
 
-/// Longest wait for expected output, in steps.
+/// Longest wait for expected output, as a number of steps.
 const STEPS: u32 = 1200;
 const STEP: Duration = Duration::from_millis(100);
 
@@ -32,12 +32,13 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Runs the program in a folder on a terminal of `columns` columns, with these variables and `TERM=xterm`.
+    /// Runs the program in a folder on a terminal of `columns` columns. Its environment has these variables and
+    /// `TERM=xterm`.
     pub fn run(folder: &Folder, arguments: &[&str], columns: u16, variables: &[(&str, &str)]) -> Self {
         Self::sized(folder, arguments, (columns, 24), variables)
     }
 
-    /// As [`Screen::run`], with the number of lines given.
+    /// As [`Screen::run`], with both columns and lines given.
     pub fn sized(
         folder: &Folder,
         arguments: &[&str],
@@ -56,13 +57,13 @@ impl Screen {
         command.envs(variables.iter().copied());
         command.stdin(end()).stdout(end()).stderr(end());
         let child = command.spawn().unwrap();
-        // The command would keep the terminal open after the program has ended.
+        // As long as the command exists, it keeps the terminal open, even after the program's end.
         drop(command);
         let mut reading = clone(&master);
         let (to, coming) = channel();
         thread::spawn(move || {
             let mut bytes = [0; 4096];
-            // On Linux, reading from a terminal that nobody has open is an error.
+            // On Linux, reading fails if no process has the terminal open.
             while let Ok(count @ 1..) = reading.read(&mut bytes) {
                 if to.send(bytes[..count].to_vec()).is_err() {
                     return;
@@ -72,14 +73,14 @@ impl Screen {
         Self { child, keys: File::from(master), coming, seen: RefCell::default(), size: (lines, columns) }
     }
 
-    /// All output so far, with its escape sequences.
+    /// All output so far, including escape sequences.
     pub fn shown(&self) -> String {
         let mut seen = self.seen.borrow_mut();
         seen.extend(self.coming.try_iter().flatten());
         String::from_utf8_lossy(&seen).into_owned()
     }
 
-    /// Waits for a text; returns the output up to it.
+    /// Waits for a text; returns the output up to this text.
     #[track_caller]
     pub fn until(&self, text: &str) -> String {
         for _ in 0..STEPS {
@@ -92,7 +93,7 @@ impl Screen {
         panic!("{text:?} doesn't appear: {:?}", self.shown());
     }
 
-    /// The terminal's present content, as interpreted by another terminal emulator.
+    /// The terminal's present content, as a separate terminal emulator interprets it.
     pub fn terminal(&self) -> vt100::Parser {
         self.shown();
         let [lines, columns] = [self.size.0, self.size.1].map(|size| NonZero::new(size).unwrap());
@@ -101,7 +102,8 @@ impl Screen {
         terminal
     }
 
-    /// The page as text without trailing spaces: whether the program writes them depends on the earlier content.
+    /// The page as text without trailing spaces, which the program writes or leaves out depending on the earlier
+    /// content.
     pub fn page(&self) -> String {
         let page = self.terminal().screen().contents();
         page.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
@@ -122,7 +124,7 @@ impl Screen {
         panic!("{text:?} doesn't appear: {before}");
     }
 
-    /// Changes the terminal's size, to columns and lines.
+    /// Changes the terminal's size to these columns and lines.
     pub fn resize(&mut self, (columns, lines): (u16, u16)) {
         self.size = (lines, columns);
         tcsetwinsize(&self.keys, Winsize { ws_row: lines, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 })
@@ -139,7 +141,7 @@ impl Screen {
         kill_process(Pid::from_child(&self.child), signal).unwrap();
     }
 
-    /// Whether the terminal has echo and line mode on, as a shell leaves it.
+    /// Whether the terminal is in echo and line mode, as a shell leaves it.
     pub fn is_in_order(&self) -> bool {
         use rustix::termios::{LocalModes, tcgetattr};
         let all = LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG;
@@ -151,7 +153,7 @@ impl Screen {
     pub fn end(&mut self) -> (Option<i32>, String) {
         for _ in 0..STEPS {
             if let Some(status) = self.child.try_wait().unwrap() {
-                // The last output may still be in transit.
+                // The last output may still be on its way.
                 thread::sleep(STEP);
                 return (status.code(), self.shown());
             }
@@ -163,7 +165,7 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        // A process that has ended can't be killed.
+        // This fails if the process has already ended.
         self.child.kill().ok();
         self.child.wait().ok();
     }

@@ -1,6 +1,6 @@
-//! A small vehicle and a short dive.
+//! Files of a small vehicle and a short dive.
 
-/// Two heads in a circular tunnel, with all sensors that give a position.
+/// Two heads in a circular tunnel, with all sensors for the position.
 pub const VEHICLE: &str = r#"name = "test vehicle"
 target_m = 1.2
 
@@ -64,7 +64,7 @@ plugin = "tether_hid"
 counts_per_metre = 2000
 "#;
 
-/// Six tables that share one line, and a velocity log.
+/// An autopilot with six sensor tables that share one line, and a velocity log.
 const OTHER_SENSORS: &str = r#"
 [[sensors]]
 id = "imu"
@@ -124,13 +124,13 @@ plugin = "tether_hid"
 counts_per_metre = 2000
 "#;
 
-/// The two heads on a vehicle whose other sensors belong to an autopilot.
+/// The two heads on a vehicle with all other sensors on an autopilot.
 pub fn other_vehicle() -> String {
     let heads = VEHICLE.split("[[sensors]]\nid = \"ping_left\"").next().unwrap();
     format!("{heads}{OTHER_SENSORS}")
 }
 
-/// A dive of 20 s and 4 m. Parts of the last metre are never seen from both sides.
+/// A dive of 20 s over 4 m. No head sees parts of the last metre from both sides.
 pub const SCENE: &str = r#"name = "short dive"
 vehicle = "vehicle.toml"
 

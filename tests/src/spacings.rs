@@ -1,36 +1,36 @@
-//! T_x, T_y and T of every sample of a dive by their definitions, each sample against all samples before it.
+//! Computes T_x, T_y and T of every sample of a dive from their definitions, by comparison with all earlier samples.
 //!
-//! A *pass* over a place of the perimeter is one step of a head. The pings at both ends of the step have a return,
-//! and the arc between them (the shorter way round) contains that place. The position of the pass is interpolated
-//! linearly on the unrolled wall. A step over pings without a return has not sampled the places between. A step is
-//! earlier than a sample if both its ends are. Whether the end point of a row of steps belongs to the row is left
-//! open, so such samples have two values.
+//! A *pass* over a place on the perimeter is one step of a head. Both pings of the step have a return, and the arc
+//! between them (the shorter way round) contains the place. The chainage of the pass is interpolated linearly on the
+//! unrolled wall. A step across pings without a return is no pass, because the places between its ends aren't
+//! sampled. A step is earlier than a sample if both of its ends are. The definitions don't say whether a series of
+//! steps includes its end points. Samples at such points therefore have two values.
 
 use headrace_geometry::math;
 
 use crate::instrumented::{Ping, Sample};
 
-/// Positions this close to the ends of a step, as a share of it, may be due to rounding.
+/// Tolerance for rounding at the ends of a step, as a fraction of the step.
 const ROUNDING: f64 = 1e-9;
 
-/// A sample's spacings, m.
+/// Spacings of a sample, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spacing {
-    /// Chainage, m.
+    /// Chainage of the sample, m.
     pub x_m: f64,
-    /// T_x: chainage to the nearest earlier pass, without and with the end points of rows.
+    /// T_x: distance in chainage to the nearest earlier pass, without and with the end points of series.
     pub t_x_m: [Option<f64>; 2],
-    /// T_y: distance to the last sample of the same head.
+    /// T_y: distance to the previous sample of the same head.
     pub t_y_m: Option<f64>,
-    /// T of both, without and with the end points of rows.
+    /// T from T_x and T_y, without and with the end points of series.
     pub t_m: [Option<f64>; 2],
 }
 
 struct Step {
     from: [f64; 2],
-    /// Chainage and arc length from there, the shorter way round.
+    /// Chainage and arc length relative to `from`, the shorter way round.
     by: [f64; 2],
-    /// Whether a step in the same direction adjoins its beginning and its end.
+    /// Whether another step in the same direction precedes and follows this step.
     joined: [bool; 2],
 }
 
@@ -48,15 +48,15 @@ impl Step {
 
 #[derive(Clone, Default)]
 struct Head {
-    /// Its last sample in this sweep.
+    /// Previous sample in this sweep.
     last: Option<Sample>,
-    /// Whether its last ping returned.
+    /// Whether the previous ping has a return.
     returned: bool,
-    /// Number of the step that led to its last ping.
+    /// Index of the step that ended at the previous ping.
     step: Option<usize>,
 }
 
-/// Spacings of all samples, in order.
+/// Spacings of all samples, in order of the samples.
 pub fn spacings(pings: &[Ping], perimeter_m: f64) -> Vec<Spacing> {
     let heads = pings.iter().map(|ping| ping.head + 1).max().unwrap_or(0);
     let mut heads = vec![Head::default(); heads];
@@ -105,7 +105,7 @@ fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     math::hypot(math::hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2])
 }
 
-/// Least, mean and greatest value, and variance; `None` without values.
+/// Minimum, mean, maximum and variance; `None` without values.
 pub fn spread(values: &[f64]) -> Option<[f64; 4]> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -1,4 +1,4 @@
-//! Dives that record the navigation's estimates beside the true poses.
+//! Dives in which the navigation's estimates are recorded together with the true poses.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -21,14 +21,14 @@ use headrace_sensor::reading::Reading;
 use headrace_simulator::{START, Scene, Scenery, Simulation};
 use headrace_vehicle::NavigationConfig;
 
-/// More than the number of records in a dive of an hour.
+/// Capacity for records, more than a dive of an hour needs.
 const MOST_SAID: usize = 1 << 20;
 
 /// A requested fix, with the true pose.
 pub struct Tracked {
     /// Time of the request.
     pub at: MonoNs,
-    /// Fix, or the reason why there is none.
+    /// The fix, or the reason why it is missing.
     pub fix: Result<Fix, NoFix>,
     /// True pose.
     pub truth: Pose,
@@ -38,9 +38,9 @@ pub struct Tracked {
 pub struct Epoch {
     /// Time of the estimate.
     pub at: MonoNs,
-    /// Factors of its covariance.
+    /// Factors of the estimate's covariance.
     pub factors: Box<Factors<ERRORS>>,
-    /// Errors that take the estimate to the truth; only those of the pose are known.
+    /// Corrections that turn the estimate into the truth. Only those of the pose are known.
     pub errors: Errors,
 }
 
@@ -48,15 +48,15 @@ pub struct Epoch {
 pub struct Track {
     /// Fixes in the order of their requests.
     pub fixes: Vec<Tracked>,
-    /// Estimates in order of time.
+    /// Estimates in time order.
     pub epochs: Vec<Epoch>,
-    /// Agreement of sources after each fused measurement: time of the last epoch, source, and statistics so far.
+    /// Consistency statistics after each fused measurement: time of the last epoch, source, and statistics so far.
     pub consistency: Vec<(MonoNs, usize, Consistency)>,
     /// Report of the dive.
     pub report: Report,
 }
 
-/// Silence of some sources during a time.
+/// A time in which some sources are silent.
 #[derive(Debug, Clone, Default)]
 pub struct Silence {
     /// Numbers of the sources.
@@ -91,7 +91,7 @@ impl Transparent for FilterNavigation {
     }
 }
 
-/// A navigation that returns the true pose.
+/// A navigation that always returns the true pose.
 struct Truth(Scenery);
 
 impl Stateful for Truth {
@@ -119,7 +119,7 @@ impl Navigation for Truth {
 
 impl Transparent for Truth {}
 
-/// Simulates and replays a scene with samples at their true places.
+/// Simulates a scene and replays it with every sample at its true place.
 pub fn true_dive(scene: &Scene) -> Track {
     let simulation = Simulation::new(scene).unwrap();
     dive(scene, Truth(simulation.scenery().unwrap().clone()), Silence::default())
@@ -133,7 +133,7 @@ struct RecordedNavigation<N> {
     said: SyncSender<Said>,
 }
 
-/// Records aren't part of the state.
+/// A snapshot excludes the records.
 impl<N: Transparent> Stateful for RecordedNavigation<N> {
     fn save(&self, to: &mut Saver) {
         self.inner.save(to);
@@ -175,7 +175,7 @@ impl<N: Transparent> Navigation for RecordedNavigation<N> {
     }
 }
 
-/// The filter with the settings of a scene.
+/// The filter with a scene's settings.
 pub fn filter(scene: &Scene) -> FilterNavigation {
     let vehicle = &scene.vehicle;
     let settings = match vehicle.navigation {
@@ -185,7 +185,7 @@ pub fn filter(scene: &Scene) -> FilterNavigation {
     FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings)
 }
 
-/// Simulates and replays a scene with this navigation.
+/// Simulates a scene and replays it with this navigation.
 pub fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> Track {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

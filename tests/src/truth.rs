@@ -7,7 +7,7 @@ use headrace_vehicle::VehicleConfig;
 pub use headrace_oracle::dive::{JudgedDive, JudgedSection, Recorded};
 pub use headrace_oracle::truth::{REPLACING, TrueSample, Truth};
 
-/// Simulates a scene and replays it with its own vehicle file.
+/// Simulates a scene and replays it with the scene's own vehicle file.
 pub fn dive(scene: &Scene) -> JudgedDive {
     dive_believing(scene, &scene.vehicle)
 }
@@ -17,7 +17,7 @@ pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> JudgedDive {
     dive_noting(scene, believed, &mut |_| {})
 }
 
-/// As [`dive_believing`]; `note` sees the loop after each tick.
+/// As [`dive_believing`]; calls `note` with the loop after each tick.
 pub fn dive_noting(scene: &Scene, believed: &VehicleConfig, note: &mut dyn FnMut(&Loop)) -> JudgedDive {
     let recorded = Recorded::of(scene, believed).unwrap_or_else(|why| panic!("{why}"));
     recorded.judged_with(believed, believed.navigation(), note).unwrap()

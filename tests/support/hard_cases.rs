@@ -8,18 +8,19 @@ use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Variable that names a file. If it is set, results are collected there instead of being compared with the page.
+/// Environment variable with a file name. If it is set, results are written to this file and not compared with the
+/// page.
 const COLLECT: &str = "HEADRACE_HARD_CASES";
 
-/// Checks the error of a case, named as in `tests/hard_cases/list`, in the unit of that list.
+/// Checks the error of one case. Name and unit of the case are those in `tests/hard_cases/list`.
 ///
-/// Panics: the error is over its bound, is no number, or differs from the page.
+/// Panics: the error is over its bound, isn't a number, or differs from the page.
 #[track_caller]
 pub fn found(name: &str, error: f64, bound: f64) {
     tell(name, error, bound, None);
 }
 
-/// As [`found`], for a problem with a condition number: the factor by which it magnifies input errors.
+/// As [`found`], for a problem with a condition number, which is the factor between input errors and result errors.
 ///
 /// Panics: as [`found`].
 #[track_caller]
@@ -73,7 +74,7 @@ fn read(name: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
 }
 
-/// One significant digit, so that other processors and profiles print the same.
+/// Rounds to one significant digit, so that other processors and build profiles print the same value.
 fn rounded(value: f64) -> String {
     if value == 0.0 { "0".to_owned() } else { format!("{value:.0e}") }
 }

@@ -5,10 +5,10 @@ pub mod recordings;
 
 use std::io::Write as _;
 
-/// Prints that a test is skipped, and why. `.ci/count-skipped` counts these lines at the end of a run.
+/// Prints that a test is skipped, with the reason. `.ci/count-skipped` counts these lines at the end of a run.
 ///
-/// It writes straight to standard error, because cargo shows `eprintln!` output of failed tests only. It writes in
-/// one piece, because tests run in parallel.
+/// The line goes straight to standard error, because Cargo shows the `eprintln!` output of failed tests only. It is
+/// written in one piece, because tests run in parallel.
 #[expect(clippy::unwrap_used, reason = "a test that can't report a skip fails")]
 pub fn skipped(why: &str) {
     std::io::stderr().write_all(format!("skipped: {why}\n").as_bytes()).unwrap();

@@ -1,8 +1,8 @@
-//! The armed loop allocates nothing, tested with a million packets of a four-head dive, with recorder and notice
+//! The armed loop allocates nothing. The test runs a million packets of a four-head dive with recorder and notice
 //! outlet.
 //!
-//! The allocator counts calls on the loop's thread. The absence of locks is checked by clippy.toml, which bars lock
-//! types from the whole workspace.
+//! The allocator counts calls on the loop's thread. clippy.toml bars lock types from the whole workspace, so this
+//! test doesn't check locks.
 
 #![expect(clippy::unwrap_used, reason = "a failed step ends the test")]
 #![expect(
@@ -39,7 +39,7 @@ thread_local! {
 }
 
 fn count() {
-    // Const-initialised and without a destructor, so reading it allocates nothing.
+    // The counter is const-initialised and has no destructor, so reading it allocates nothing.
     COUNTED.with(|counted| counted.set(counted.get().map(|n| n + 1)));
 }
 
@@ -74,8 +74,8 @@ fn allocations(work: impl FnOnce()) -> u64 {
     COUNTED.with(|counted| counted.replace(None)).unwrap()
 }
 
-/// Forward, too fast over a stretch, back over it, and forward again, so that flags are raised and cleared. All heads
-/// are silent for a while.
+/// The vehicle goes forward, is too fast over a stretch, and goes back over it and forward again, so that flags are
+/// raised and cleared. All heads are silent for a while.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n
 [[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n
@@ -83,7 +83,7 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 200\nspeed_mps = 0.35\n
 [[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]\nfrom_s = 820\nfor_s = 40\n";
 
-/// Operator actions, one each second; the last is no valid command.
+/// Operator actions, one per second. The last one is an invalid command.
 const COMMANDS: [&str; 9] = [
     r#"{"do":"silence","by":"AB"}"#,
     r#"{"do":"note","text":"rubble \u006ceft","by":"AB"}"#,
@@ -106,7 +106,7 @@ fn million_packets_need_no_allocation() {
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref()).unwrap();
     }
-    // Nobody empties this outlet: dropping the oldest notice must not allocate either.
+    // Nobody empties this outlet, because dropping the oldest notice must not allocate either.
     let (outlet, notices) = NoticeOutlet::new(1000);
     app.add_plugin(&outlet).unwrap();
     let header = LogHeader {
@@ -122,7 +122,7 @@ fn million_packets_need_no_allocation() {
     };
     let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
     app.add_plugin(&RecorderOutlet::new([port])).unwrap();
-    // Nobody empties the journal of the filter's steps either.
+    // Nobody empties the journal of the filter's steps either, so that it also drops the oldest ones.
     let (journal, steps) = Journal::new(1000);
     let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };
     let profile = vehicle.tunnel.profile.clone();
@@ -152,7 +152,7 @@ fn million_packets_need_no_allocation() {
             allocated += allocations(|| consumed = dive.tick(until));
             packets += consumed;
             if consumed == 0 {
-                // The recorder is behind and holds packets back; it loses none.
+                // The recorder has a backlog, so the loop holds packets back. None of them is lost.
                 waited += 1;
                 std::thread::sleep(std::time::Duration::from_millis(1));
             }
@@ -171,7 +171,7 @@ fn million_packets_need_no_allocation() {
     assert!(written.messages >= packets as u64, "recorded input is never dropped");
 }
 
-/// Lines of these devices, with some damage, in pieces.
+/// Data of these devices in pieces, some of them damaged.
 #[test]
 fn decoders_of_other_vehicles_allocate_nothing() {
     let header = MavHeader { system_id: 1, component_id: 1, sequence: 0 };

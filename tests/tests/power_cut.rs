@@ -1,7 +1,7 @@
-//! `kill -9` at random moments: every log is readable and loses at most the last second.
+//! `kill -9` at random moments. Every log is readable and loses the last second at most.
 //!
-//! Everything displayed more than a second before the kill is in the log, and its replay is the dive up to there, bit
-//! for bit.
+//! The log contains everything that was displayed more than a second before the kill. Its replay gives the same dive
+//! up to that moment, bit for bit.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -15,14 +15,14 @@ use serde_json::Value;
 
 /// Number of dives that are killed.
 const KILLS: usize = 200;
-/// Number of dives that run at a time.
+/// Number of dives that run at the same time.
 const AT_ONCE: usize = 6;
 /// Longest life of a dive, ms.
 const LONGEST_MS: u64 = 2200;
-/// Largest loss in a power cut.
+/// Largest loss that a power cut may cause.
 const MAY_COST: Duration = Duration::from_secs(1);
 
-/// A dive of a minute and a half, partly too fast, so that there are flags to lose.
+/// A dive of a minute and a half. A part of it is too fast, so that there are flags to lose.
 const SCENE: &str = r#"name = "a dive to kill"
 vehicle = "vehicle.toml"
 
@@ -53,20 +53,20 @@ fn wall_clock() -> Instant {
 /// Results of the kills.
 #[derive(Default)]
 struct Count {
-    /// Kills before the log had a beginning.
+    /// Number of kills before the log had a header.
     before: AtomicUsize,
-    /// Kills after the dive had ended by itself.
+    /// Number of kills after the dive had ended by itself.
     after: AtomicUsize,
-    /// Lines displayed more than a second before the kill.
+    /// Number of lines displayed more than a second before the kill.
     lines: AtomicUsize,
-    /// Results that were identical, bit for bit.
+    /// Number of results that were identical, bit for bit.
     same: AtomicU64,
-    /// Longest delay with which this machine's disk or processor served a thread, ns. Tests may share both with other
-    /// work.
+    /// Longest delay with which the disk or processor of this machine served a thread, ns. Other work may use both at
+    /// the same time.
     late_ns: AtomicU64,
 }
 
-/// The `n`th of a sequence of random numbers.
+/// Number `n` of a sequence of random numbers.
 fn random(n: u64) -> u64 {
     let mut word = (n + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -74,7 +74,8 @@ fn random(n: u64) -> u64 {
     word ^ (word >> 31)
 }
 
-/// Starts a dive and kills it. Returns its lines from more than a second before, and whether it had ended by itself.
+/// Starts a dive and kills it. Returns the lines displayed more than a second before the kill, and whether the dive
+/// had ended by itself.
 fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -> (Vec<String>, bool) {
     let mut dive = headrace_tests::program()
         .args(arguments)
@@ -88,7 +89,8 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
         out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
     });
     std::thread::sleep(after);
-    // The limit is a second before the kill could take effect, not before it was sent.
+    // The second before the kill counts from this moment, after which the kill may take effect, and not from the
+    // moment of sending it.
     let moment = wall_clock();
     let ended = dive.try_wait().unwrap().is_some();
     dive.kill().ok();
@@ -98,7 +100,7 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
     (known.map(|(_, line)| line).collect(), ended)
 }
 
-/// Whether all lines occur among the others, in order.
+/// Whether all these lines occur in `others`, in the same order.
 fn is_subsequence(lines: &[String], others: &str) -> bool {
     let mut rest = others.lines();
     lines.iter().all(|line| rest.any(|other| other == line))
@@ -126,8 +128,8 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
 
     let answer = folder.headrace(&["verify", "--json", &log]);
     let Ok(told) = serde_json::from_str::<Value>(&answer.stdout) else {
-        // The file or its header didn't exist yet, so there was no dive either.
-        assert!(lines.is_empty(), "{which}: {}, and the pilot had read {lines:?}", answer.stderr);
+        // The file or its header didn't exist yet, so the dive hadn't begun.
+        assert!(lines.is_empty(), "{which}: {}, but the pilot had read {lines:?}", answer.stderr);
         let early = ["could not open", "is not an MCAP file", "no vehicle file can be read"];
         assert!(early.iter().any(|words| answer.stderr.contains(words)), "{which}: {}", answer.stderr);
         count.before.fetch_add(1, Ordering::Relaxed);
@@ -145,7 +147,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
     let replayed = folder.headrace(&["replay", &log]).stdout;
     assert!(
         is_subsequence(&lines, &replayed),
-        "{which}: the pilot had read {lines:#?}, replayed is {replayed}"
+        "{which}: the pilot had read {lines:#?}, but the replay shows {replayed}"
     );
     let log = folder.path(&log);
     std::fs::remove_file(&log).unwrap_or_else(|error| panic!("{}: {error}", log.display()));

@@ -1,4 +1,4 @@
-//! Dives in the simulated world of faults satisfy all invariants, for every seed.
+//! Dives in the simulated world of faults, which satisfy all invariants for every seed.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -9,9 +9,9 @@ use headrace_tests::world::invariants::broken;
 use headrace_tests::world::plan::Plan;
 use headrace_tests::world::{DiveResult, Sabotage, World};
 
-/// Default seeds; the environment can give others: `HEADRACE_WORLD_SEEDS=1000..2000`.
+/// Default seeds. The environment can set others: `HEADRACE_WORLD_SEEDS=1000..2000`.
 const SEEDS: std::ops::Range<u64> = 0..300;
-/// Number of worlds in which a sabotage must show.
+/// Number of worlds, in at least one of which a sabotage must be detected.
 const ENOUGH: u64 = 100;
 
 fn seeds() -> std::ops::Range<u64> {
@@ -20,7 +20,7 @@ fn seeds() -> std::ops::Range<u64> {
     from.parse().unwrap()..to.parse().unwrap()
 }
 
-/// Runs a world; returns its broken invariants and its results.
+/// Runs the world of a seed; returns broken invariants and results.
 fn lived(folder: &Folder, seed: u64, sabotage: Option<Sabotage>) -> (Vec<String>, DiveResult) {
     let lived = World::sabotaged(seed, sabotage).live();
     let replayed = lived.replay(folder);
@@ -52,12 +52,12 @@ fn faults_lose_nothing_silently() {
     println!(
         "{worlds} worlds, {failures} operations of the disk failed, {skipping} recorders left packets out, {faults:#?}"
     );
-    assert!(skipping > 0, "no recorder's queue was full for long");
+    assert!(skipping > 0, "no recorder's queue was full long enough");
     assert_eq!(faults.len(), 10 + 4 + 5 + 3, "kinds of faults: {faults:#?}");
 }
 
 #[test]
-fn seed_repeats_its_world() {
+fn same_seed_gives_the_same_world() {
     for seed in 0..5 {
         let [first, second] = [0, 1].map(|_| World::new(seed).live());
         assert_eq!((first.digest, &first.consumed), (second.digest, &second.consumed));
@@ -70,14 +70,15 @@ fn seed_repeats_its_world() {
 }
 
 #[test]
-fn sabotage_is_found() {
+fn every_sabotage_breaks_an_invariant() {
     let folder = Folder::new();
     for sabotage in Sabotage::ALL {
         let found = (0..ENOUGH).find_map(|seed| {
             let (broken, ..) = lived(&folder, seed, Some(sabotage));
             (!broken.is_empty()).then_some((seed, broken))
         });
-        let (seed, broken) = found.unwrap_or_else(|| panic!("{sabotage:?} shows in none of {ENOUGH} worlds"));
+        let (seed, broken) =
+            found.unwrap_or_else(|| panic!("{sabotage:?} breaks no invariant in {ENOUGH} worlds"));
         println!("{sabotage:?}: found in world {seed}: {}", broken[0]);
     }
 }

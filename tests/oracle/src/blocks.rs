@@ -1,4 +1,4 @@
-//! Splits the wall of a long dive into blocks, because a search of [`Wall`] scans all of its samples.
+//! Splits the wall of a long dive into blocks, because a search in a [`Wall`] scans all samples of that wall.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -7,7 +7,7 @@ use super::truth::Truth;
 use super::wall::Wall;
 use crate::TruthError;
 
-/// Length of a block, and of the overlap searched on either side of it, m.
+/// Length of a block, and of the overlap that is searched on either side of the block, m.
 const BLOCK_M: f64 = 64.0;
 const BEYOND_M: f64 = 32.0;
 /// Longest dive that is handled as a single block, m.
@@ -17,7 +17,7 @@ const WHOLE_M: f64 = 256.0;
 pub(crate) struct Blocks {
     /// Wall of a short dive.
     whole: Option<Wall>,
-    /// Blocks of a long dive by number, built on demand.
+    /// Blocks of a long dive by block number, built on demand.
     blocks: RefCell<BTreeMap<i64, Wall>>,
 }
 
@@ -31,7 +31,7 @@ impl Blocks {
         Ok(Self { whole, blocks: RefCell::default() })
     }
 
-    /// Hole diameter D of a stretch, m; infinite without a sample nearby, or if samples are rejected.
+    /// Hole diameter D of a stretch, m. It is infinite if no sample is nearby or a sample is invalid.
     pub(crate) fn hole_m(&self, truth: &Truth, from_m: f64, to_m: f64) -> f64 {
         if let Some(whole) = &self.whole {
             return whole.hole_m(from_m, to_m);
@@ -43,10 +43,11 @@ impl Blocks {
             let near = (begins_m - BEYOND_M)..(ends_m + BEYOND_M);
             let places =
                 truth.samples.iter().map(|sample| sample.place).filter(|[x_m, _]| near.contains(x_m));
-            // `Wall::new` rejects only samples that aren't numbers, and true samples always are numbers.
+            // This never fails: `Wall::new` rejects only coordinates that aren't numbers, and true samples always are
+            // numbers.
             Wall::new(places, truth.perimeter_m).unwrap_or_default()
         });
-        // A larger circle may contain samples that lie outside this block and its overlap.
+        // A larger circle could contain samples outside this block and its overlap, so its size is unknown.
         Some(wall.hole_m(from_m, to_m)).filter(|hole_m| *hole_m < 2.0 * BEYOND_M).unwrap_or(f64::INFINITY)
     }
 }

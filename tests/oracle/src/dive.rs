@@ -1,8 +1,9 @@
 //! Simulates a dive once, replays it with any settings, and compares the reported sections with D_true.
 //!
 //! The estimated chainage may have a constant offset (slack, wheel scale). Section bounds are in estimated chainage,
-//! because a vehicle would be sent back by it. For the comparison each section's bounds are shifted by the median of
-//! true minus estimated vehicle chainage, over the pings whose samples landed in or near the section.
+//! because a pilot goes back to an estimated chainage. For the comparison, the bounds of each section are shifted by
+//! an offset. This offset is the median of true minus estimated vehicle chainage over all pings with samples in or
+//! near the section.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -29,7 +30,7 @@ use crate::blocks::Blocks;
 use crate::timed;
 use crate::truth::{Truth, TruthTaker};
 
-/// Samples up to this far from a section count for its chainage offset, m.
+/// Samples count for a section's chainage offset up to this distance from the section, m.
 const NEAR_M: f64 = 1.0;
 
 /// Packets sent by the devices, in order of time.
@@ -51,18 +52,18 @@ impl Packets {
         self.list.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no packets.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
-    /// Feed of all packets from the first, for a loop.
+    /// Returns a feed that gives a loop all packets in order.
     pub fn feed(&self) -> PacketFeed<'_> {
         PacketFeed { packets: self, next: 0, from: 0 }
     }
 }
 
-/// Packet source that reads from memory.
+/// Feed of packets from memory.
 #[derive(Debug)]
 pub struct PacketFeed<'a> {
     packets: &'a Packets,
@@ -103,20 +104,20 @@ pub struct Recorded {
     holes_m: RefCell<BTreeMap<[u64; 2], f64>>,
 }
 
-/// A section as reported, with its true hole.
+/// A reported section with its true hole.
 #[derive(Debug, Clone)]
 pub struct JudgedSection {
     /// Report of the section.
     pub report: SectionReport,
-    /// D_true, m; infinite without a single sample.
+    /// D_true, m; infinite without samples.
     pub true_hole_m: f64,
-    /// True less estimated chainage, m.
+    /// True minus estimated chainage, m.
     pub shift_m: f64,
 }
 
-/// A dive as reported, with its truth.
+/// Report of a dive, with its truth.
 pub struct JudgedDive {
-    /// Report of the loop.
+    /// Report from the loop.
     pub report: Report,
     /// The truth.
     pub truth: Arc<Truth>,
@@ -139,8 +140,8 @@ pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> Result<JudgedD
 }
 
 impl Recorded {
-    /// Simulates a scene. A pilot who follows advice gets it from a loop configured with `believed`, which also
-    /// supplies the profile for arc lengths.
+    /// Simulates a scene. `believed` configures the loop that advises the simulated pilot, and supplies the profile
+    /// for arc lengths.
     ///
     /// Errors: the scene can't be simulated, or the oracle rejects its truth.
     pub fn of(scene: &Scene, believed: &VehicleConfig) -> Result<Self, TruthError> {
@@ -171,7 +172,7 @@ impl Recorded {
         ends.map_or(0.0, |((first, ..), (last, ..))| last.since(*first).as_secs_f64())
     }
 
-    /// D_true of a stretch of true chainage, m; infinite without a single sample.
+    /// D_true of a stretch of true chainage, m; infinite without samples.
     pub fn true_hole_m(&self, from_m: f64, to_m: f64) -> f64 {
         let key = [from_m.to_bits(), to_m.to_bits()];
         *self.holes_m.borrow_mut().entry(key).or_insert_with(|| self.wall.hole_m(&self.truth, from_m, to_m))
@@ -184,7 +185,7 @@ impl Recorded {
         self.judged_with(vehicle, vehicle.navigation(), &mut |_| {})
     }
 
-    /// As [`Recorded::judged`], with another navigation; `note` sees the loop after each tick.
+    /// As [`Recorded::judged`], with another navigation. Calls `note` with the loop after each tick.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn judged_with(
@@ -292,11 +293,11 @@ fn scenery_of(simulation: &Simulation) -> Result<Scenery, TruthError> {
     })
 }
 
-/// Time, chainage and vehicle chainage of each placed sample, all as estimated.
+/// Time, estimated chainage and estimated vehicle chainage of each placed sample.
 #[derive(Resource, Default)]
 struct Seen(Vec<(MonoNs, f64, f64)>);
 
-/// Observer that copies how samples were placed and changes nothing.
+/// Observer that records the places of samples and changes nothing.
 struct Watch;
 
 impl Plugin for Watch {
@@ -327,12 +328,14 @@ impl Seen {
     }
 }
 
-/// Estimated chainage of samples with true minus estimated vehicle chainage, m; sorted by chainage.
+/// Pairs for each sample: its estimated chainage, and the true minus estimated vehicle chainage, m. Sorted by
+/// chainage.
 #[derive(Default)]
 struct Shifts(Vec<(f64, f64)>);
 
 impl Shifts {
-    /// Median shift near a section, else the shift of the nearest sample, else 0.
+    /// Median shift of the samples near a section. Without any, the shift of the nearest sample; without samples at
+    /// all, 0.
     fn about(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|(sample_x_m, _)| *sample_x_m < x_m);
         let near = self.0.get(before(from_m - NEAR_M)..before(to_m + NEAR_M)).unwrap_or_default();

@@ -1,7 +1,7 @@
-//! Computes D_true, the hole diameter D over the places where beams truly met the wall.
+//! Computes D_true: the hole diameter D over the places where beams truly met the wall.
 //!
-//! It uses Voronoi vertices and edges of a triangulation, and arc lengths without ray casting; the program shares
-//! neither. Simulated dives are compared with it.
+//! Simulated dives are compared with D_true. Its computation uses Voronoi vertices and edges of a triangulation, and
+//! arc lengths without ray casting. The program uses neither method.
 
 mod blocks;
 mod cpu;

@@ -1,20 +1,21 @@
-//! Arc lengths from a profile's outline alone: many points of the curve, and the ray that passes between two of them.
+//! Computes arc lengths from many points on a profile's outline, as the crossing of a ray with a chord.
 //!
-//! It shares no ray casting with the program.
+//! This method shares no ray casting with the program.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz};
 
-/// Number of outline points. Chords, also those that cut a corner, stay within 0.01 mm of the curve of any tunnel.
+/// Number of outline points. All chords, including those across a corner, are within 0.01 mm of the curve in any
+/// tunnel.
 const POINTS: u32 = 200_000;
 
-/// A profile's outline about its reference point, by angle.
+/// A profile's outline, sorted by angle about the reference point.
 pub struct Outline {
     reference: Yz,
     perimeter_m: f64,
     /// Angle of the first point, rad.
     from_rad: f64,
-    /// Angle from the first point, place and arc length, in order of angle.
+    /// Points in order of angle: angle relative to the first point, place, and arc length.
     points: Vec<(f64, Yz, f64)>,
 }
 
@@ -40,7 +41,7 @@ impl Outline {
         self.perimeter_m
     }
 
-    /// Arc length at which the ray from the reference point through this one crosses the outline, m.
+    /// Arc length at which the outline crosses the ray from the reference point through `at`, m.
     pub fn arc_m(&self, at: Yz) -> f64 {
         let towards = [at[0] - self.reference[0], at[1] - self.reference[1]];
         let turned = math::wrap(math::atan2(towards[1], towards[0]) - self.from_rad, TAU);
@@ -48,7 +49,8 @@ impl Outline {
             self.points.partition_point(|(angle, ..)| *angle <= turned).clamp(1, self.points.len() - 1);
         let (_, a, arc_a_m) = self.points[after - 1];
         let (_, b, arc_b_m) = self.points[after];
-        // Distances of both ends of the chord from the ray: the crossing divides the chord in their ratio.
+        // Distances of the chord's two ends from the ray. The crossing divides the chord in the ratio of these
+        // distances.
         let beside =
             |p: Yz| towards[0] * (p[1] - self.reference[1]) - towards[1] * (p[0] - self.reference[0]);
         let (left, right) = (beside(a), beside(b));

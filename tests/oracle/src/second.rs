@@ -1,21 +1,22 @@
-//! A second computation of D_true, to bound the error of the first.
+//! A second computation of D_true, which bounds the error of the first one.
 //!
-//! It uses no Voronoi vertices. It takes the highest points of lower envelopes of distances, chainage by chainage. A
-//! circle's radius grows by no more than its centre moves. So stretches of chainage that can't hold a larger circle
-//! are dropped and the others are halved.
+//! It uses no Voronoi vertices. For one chainage at a time, it finds the highest point of the lower envelope of
+//! distances to all samples. If a circle's centre moves, its radius grows by at most that movement. So stretches of
+//! chainage that can't hold a larger circle are dropped, and all others are halved.
 
 use super::truth::Truth;
 use super::wall::Wall;
 use crate::TruthError;
 
-/// Half length at which a stretch is no longer halved, m.
+/// Stretches with this half length or less aren't halved again, m.
 const FINEST_M: f64 = 2e-10;
 
-/// D of a stretch between two chainages from envelopes alone, to within 0.5 nm, m; infinite without samples.
+/// D of a stretch between two chainages, computed from envelopes alone, m. It is exact to 0.5 nm, and infinite
+/// without samples.
 pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
     let radius_m = |x_m: f64| wall.largest_on(x_m).map_or(f64::INFINITY, |circle| circle.radius_m);
     let mut best_m = radius_m(from_m).max(radius_m(to_m));
-    // Middle and half length of the stretches that may hold a larger circle.
+    // Middle and half length of each stretch that may hold a larger circle.
     let mut stretches = vec![(f64::midpoint(from_m, to_m), (to_m - from_m) / 2.0)];
     while let Some((middle_m, half_m)) = stretches.pop() {
         let found_m = radius_m(middle_m);
@@ -30,8 +31,8 @@ pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
 
 /// Bound on the error of D_true in a dive, m.
 ///
-/// It is the largest difference between both computations, over section-long stretches between two chainages, plus
-/// the error that the arc lengths of two samples may add.
+/// This bound is the sum of two parts. One is the largest difference between the two computations over stretches of
+/// section length. The other is the error that the arc lengths of two samples may add.
 ///
 /// Errors: as for [`Wall::new`].
 pub fn may_be_off_m(
@@ -50,7 +51,7 @@ pub fn may_be_off_m(
         if !one_m.is_finite() {
             continue;
         }
-        // Samples farther away than the hole's diameter can't touch its circle.
+        // Samples that are farther from the stretch than the hole's diameter can't touch the hole's circle.
         let near = |x_m: f64| x_m >= begin_m - one_m && x_m <= end_m + one_m;
         let places = truth.samples.iter().map(|sample| sample.place).filter(|place| near(place[0]));
         let other_m = hole_m(&Wall::new(places, truth.perimeter_m)?, begin_m, end_m);

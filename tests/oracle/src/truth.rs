@@ -26,7 +26,7 @@ pub const REPLACING: [&str; 10] = [
     "device_faults",
     "stuck_range",
 ];
-/// Properties that those effects change in a replaced return.
+/// Properties by which those effects mark a changed return.
 const REPLACED: [&str; 2] = ["range_m", "wrong_bytes"];
 
 /// A place where a beam truly met the wall.
@@ -45,13 +45,13 @@ pub struct TrueSample {
 pub struct Truth {
     /// Places where beams met the wall, grouped by source within each second.
     pub samples: Vec<TrueSample>,
-    /// Least and greatest chainage of the vehicle, m.
+    /// Smallest and largest chainage of the vehicle, m.
     pub way_m: [f64; 2],
     /// Length of the wall's circumference, m.
     pub perimeter_m: f64,
-    /// Number of returns of profiling heads, from the wall or not.
+    /// Number of all returns of profiling heads, including returns that didn't meet the wall.
     pub returns: u64,
-    /// Largest difference between a sample's arc length here and in the simulator, m.
+    /// Largest difference between the arc length of a sample in this oracle and in the simulator, m.
     pub arc_off_m: f64,
 }
 
@@ -68,7 +68,7 @@ impl Truth {
 pub struct TruthTaker {
     outline: Outline,
     replacing: Vec<bool>,
-    /// Least and greatest range of each source, m; `None` for sensors that are no heads.
+    /// Smallest and largest range of each source, m; `None` for sensors other than heads.
     reach_m: Vec<Option<[f64; 2]>>,
     truth: Truth,
 }
@@ -94,7 +94,7 @@ impl TruthTaker {
         }
     }
 
-    /// Collects the truth that is new since the last call.
+    /// Collects the truth that is new since the previous call.
     pub fn note(&mut self, simulation: &mut Simulation) {
         for row in simulation.take_truth() {
             let [least_m, most_m] = self.truth.way_m;
@@ -109,7 +109,7 @@ impl TruthTaker {
         }
     }
 
-    /// Returns everything collected.
+    /// Returns the collected truth.
     pub fn truth(self) -> Truth {
         self.truth
     }

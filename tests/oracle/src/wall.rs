@@ -1,16 +1,16 @@
 //! Largest empty circles on an unrolled wall, from all samples at once.
 //!
-//! Candidates are the Voronoi vertices of a Delaunay triangulation with exact predicates, and Voronoi edges where
-//! they cross the ends of a section. There are no cells and no search radius.
+//! Candidate centres are the Voronoi vertices of a Delaunay triangulation with exact predicates, and the points where
+//! Voronoi edges cross the ends of a section. There are no cells and no search radius.
 
 use headrace_geometry::math;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 use crate::TruthError;
 
-/// Smaller coordinates are set to zero, because the exact predicates accept none below 1e-142.
+/// Coordinates smaller than this are set to zero, because the exact predicates accept no nonzero value below 1e-142.
 const TINY_M: f64 = 1e-100;
-/// Largest error that rounding causes in a circumradius or a centre, m.
+/// Largest rounding error of a circumradius or a circumcentre, m.
 const ROUNDING_M: f64 = 1e-6;
 
 /// A place: chainage and arc length, m.
@@ -36,12 +36,12 @@ pub struct Circle {
     pub radius_m: f64,
 }
 
-/// All samples of a dive on a wall whose arc length is cyclic; none by default.
+/// All samples of a dive on a wall with cyclic arc length. The default has no samples.
 #[derive(Default)]
 pub struct Wall {
     perimeter_m: f64,
     samples: Vec<Place>,
-    /// The samples and their images on either side, by arc length.
+    /// The samples and their images in the neighbouring turns, sorted by arc length.
     images: Vec<Place>,
     /// Empty circles through three samples, the largest first.
     circles: Vec<Circle>,
@@ -50,7 +50,7 @@ pub struct Wall {
 impl Wall {
     /// Builds the wall from samples (chainage and arc length, m) on this perimeter, m.
     ///
-    /// Errors: a place that is no number, or farther away than any wall.
+    /// Errors: a coordinate isn't a number, or is too large for any wall.
     pub fn new(samples: impl IntoIterator<Item = Place>, perimeter_m: f64) -> Result<Self, TruthError> {
         let samples: Vec<Place> =
             samples.into_iter().map(|[x, sigma]| [x, math::wrap(sigma, perimeter_m)]).collect();
@@ -62,7 +62,7 @@ impl Wall {
         Ok(Self { perimeter_m, samples, images, circles })
     }
 
-    /// Distance from a place to the nearest sample, m; infinite without any.
+    /// Distance from a place to the nearest sample, m; infinite without samples.
     pub fn clear_m(&self, [x, sigma]: Place) -> f64 {
         let distance = |sample: &Place| {
             math::hypot(sample[0] - x, math::wrap_signed(sample[1] - sigma, self.perimeter_m))
@@ -70,7 +70,7 @@ impl Wall {
         self.samples.iter().map(distance).fold(f64::INFINITY, f64::min)
     }
 
-    /// The largest empty circle whose centre lies between two chainages; `None` without samples.
+    /// The largest empty circle with its centre between two chainages; `None` without samples.
     pub fn largest(&self, from_m: f64, to_m: f64) -> Option<Circle> {
         let ends = [self.largest_on(from_m)?, self.largest_on(to_m)?];
         let mut best = if ends[0].radius_m >= ends[1].radius_m { ends[0] } else { ends[1] };
@@ -91,10 +91,10 @@ impl Wall {
         self.largest(from_m, to_m).map_or(f64::INFINITY, |circle| 2.0 * circle.radius_m)
     }
 
-    /// The largest empty circle with its centre at one chainage. It lies where two samples are equally far: the
-    /// highest point of the lower envelope of distances.
+    /// The largest empty circle with its centre at one chainage. Its centre is equally far from two samples: it is
+    /// the highest point of the lower envelope of distances.
     pub fn largest_on(&self, x_m: f64) -> Option<Circle> {
-        // Squared distances are parabolas of one shape, so each pair crosses once.
+        // All squared distances are parabolas of the same shape, so each pair of them crosses once.
         let mut envelope: Vec<(f64, f64)> = Vec::new();
         let crossing = |left: &(f64, f64), right: &(f64, f64)| {
             0.5 * (left.0 + right.0) + (right.1 - left.1) / (2.0 * (right.0 - left.0))
@@ -127,7 +127,7 @@ impl Wall {
     }
 }
 
-/// Circumcircles of a Delaunay triangulation with centres on the wall, the largest first.
+/// Circumcircles of a Delaunay triangulation, limited to centres on the wall; the largest comes first.
 fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError> {
     let tidy = |value: f64| if value.abs() < TINY_M { 0.0 } else { value };
     let vertices = images.iter().map(|[x, sigma]| Vertex(Point2::new(tidy(*x), tidy(*sigma)))).collect();
@@ -140,7 +140,7 @@ fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError
     let mut circles: Vec<Circle> = triangles
         .inner_faces()
         .filter_map(|face| circle(face.positions().map(|at| [at.x, at.y])))
-        // Rounding may move a centre on the seam to either side, and its image to the other.
+        // Rounding may move a centre on the seam to either side of it. The tolerance keeps the circle or its image.
         .filter(|circle| (-ROUNDING_M..perimeter_m + ROUNDING_M).contains(&circle.centre[1]))
         .map(|Circle { centre: [x, sigma], radius_m }| Circle {
             centre: [x, math::wrap(sigma, perimeter_m)],
@@ -151,7 +151,7 @@ fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError
     Ok(circles)
 }
 
-/// The circle through three places; `None` if they are collinear within rounding.
+/// The circle through three places; `None` if the places are collinear within rounding.
 fn circle([a, b, c]: [Place; 3]) -> Option<Circle> {
     let [b, c] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
     let [bb, cc] = [b, c].map(|p| p[0] * p[0] + p[1] * p[1]);

@@ -1,4 +1,4 @@
-//! Builds the program as a binary of this package, since tests only get binaries of their own package.
+//! The program, built as a binary of this package, because Cargo gives tests only binaries of their own package.
 
 use std::process::ExitCode;
 

@@ -8,7 +8,7 @@ use crate::random_dives::Draw;
 
 /// Kinds of faults.
 pub const FAULTS: [&str; 5] = ["stick", "jump", "die", "return", "babble"];
-/// Senses whose devices may fail.
+/// Senses of the devices that may fail.
 pub const SENSES: [Sense; 5] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Tether];
 
@@ -17,20 +17,21 @@ pub const SENSES: [Sense; 5] =
 pub struct DeviceFault {
     /// Sense of the device.
     pub sense: Sense,
-    /// Its name.
+    /// Name of the device.
     pub sensor: String,
-    /// One of [`FAULTS`]; a device that dies recovers only with `return`.
+    /// One of [`FAULTS`]. A device with the fault `die` never recovers; one with `return` does.
     pub fault: &'static str,
-    /// Begin of the fault, seconds of the dive.
+    /// Start of the fault, seconds of the dive.
     pub from_s: f64,
-    /// Duration, seconds; `None` lasts to the end of the dive.
+    /// Duration, seconds; `None` means to the end of the dive.
     pub for_s: Option<f64>,
-    /// Size of a jump: m; degrees for a head or an inertial unit.
+    /// Size of a jump: degrees for a head or an inertial unit, m for other devices.
     pub size: f64,
 }
 
 impl DeviceFault {
-    /// The fault of a seed in a dive of this duration: senses and faults in rotation, the rest drawn.
+    /// The fault of a seed in a dive of this duration. Senses and faults rotate with the seed; all other values are
+    /// drawn.
     pub fn of(seed: u64, plain: &Scene, duration_s: f64) -> Self {
         let mut draw = Draw::new(seed ^ 0xb4ea_4a6e);
         let turn = usize::try_from(seed).unwrap();
@@ -43,7 +44,7 @@ impl DeviceFault {
         let from_s = duration_s * draw.between(0.2, 0.7);
         let length_s = math::exp(draw.between(0.0, math::ln(60.0)));
         let lasts = fault == "die" || draw.below(4) == 0;
-        // From sizes that nothing can detect to sizes that must be detected.
+        // The range extends from sizes that nothing can detect to sizes that must be detected.
         let [least, most] = match sense {
             Sense::Head | Sense::Inertial => [1.0, 40.0],
             _ => [0.05, 5.0],

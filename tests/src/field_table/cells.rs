@@ -18,31 +18,31 @@ use crate::scenes;
 pub struct Vehicle {
     /// Name in the table.
     pub name: &'static str,
-    /// Its file in `deploy/vehicles`.
+    /// File name in `deploy/vehicles`.
     pub file: &'static str,
-    /// Mode of its heads.
+    /// Mode of the heads.
     pub mode: &'static str,
     /// Target T, m.
     pub target_m: f64,
-    /// Layout of its heads.
+    /// Layout of the heads.
     pub layout: &'static str,
-    /// Length of a dive unless stated otherwise, m; longer if passes are far apart.
+    /// Default length of a dive, m. It is larger for vehicles whose passes are far apart.
     pub length_m: f64,
-    /// Factor on the chainage of [`PLACES`] beyond the portal, for tunnels shorter than 7 km.
+    /// Factor for the chainage of [`PLACES`] beyond the portal, for tunnels shorter than 7 km.
     pub far_share: f64,
-    /// Noise of its inertial unit, unless a condition changes it.
+    /// Noise of the inertial unit, unless a condition changes it.
     unit: Unit,
-    /// Largest speed that keeps the target by Eq. 16 with the vehicle's own occlusion and no other margin, m/s. It is
-    /// a constant, so that speeds derived from it don't change with the planner.
+    /// Largest speed that keeps the target by Eq. 16 with the vehicle's own occlusion and no other margin, m/s. The
+    /// value is constant, so that speeds derived from it don't change with the planner.
     pub edge_mps: f64,
 }
 
-/// Inertial units by their simulated noise, from the vehicle file or the data sheet.
+/// Inertial units, named by the source of their simulated noise: a vehicle file or a data sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Unit {
     /// Noise of the preset `xsens_mti600`: `plugins/imu_can/src/noise.rs`.
     Xsens,
-    /// An autopilot's unit, known only by the defaults of `[navigation]`.
+    /// An autopilot's unit. Its noise is that of the defaults of `[navigation]`.
     Autopilot,
 }
 
@@ -77,32 +77,33 @@ const fn vehicle(
     Vehicle { name, file, mode, target_m, layout, length_m, far_share, unit, edge_mps }
 }
 
-/// Condition of a dive: its sensor errors, wall and driving.
+/// Condition of a dive: sensor errors, wall and driving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
-    /// No effects but motion and the vehicle's own occlusion.
+    /// No effects other than motion and the vehicle's own occlusion.
     Clean,
     /// Every sensor has the noise of its data sheet.
     DataSheet,
-    /// As `DataSheet`, with a vehicle file that states the true noises: no allowance for rough walls, tilt or slack.
+    /// As `DataSheet`, but the vehicle file states the true noises. It allows for no rough walls, tilt or slack.
     Told,
-    /// A MEMS unit and slack, both stated in the vehicle file; a wheel with 0.5 % error, and steel.
+    /// A MEMS unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error, and steel
+    /// nearby.
     Poor,
-    /// Returns lost in runs, returns from before the wall, second echoes.
+    /// Series of lost returns, returns from objects before the wall, and second echoes.
     Murk,
-    /// The wall has the roughness that vehicle files allow for.
+    /// The wall is as rough as vehicle files allow for.
     Rough,
     /// The wall deviates from the design by some centimetres, inwards and outwards.
     AsBuilt,
     /// A pilot who wanders, stops and turns back.
     Lively,
-    /// The water's speed of sound is 4 % above that of the vehicle file.
+    /// The speed of sound in the water is 4 % above the value in the vehicle file.
     WrongSound,
-    /// A head is turned by 3 degrees against the vehicle file.
+    /// The mount of a head differs by 3 degrees from the vehicle file.
     WrongMount,
     /// The wall is 6 % wider than in the vehicle file.
     WrongWall,
-    /// A sensor's data arrive 0.3 s late.
+    /// The data of a sensor arrive 0.3 s late.
     WrongLatency,
     /// The cable's counter reads 2 % too much.
     WrongCable,
@@ -110,11 +111,11 @@ pub enum Condition {
     WrongUnit,
     /// The cable hangs, but the vehicle file states that it is taut.
     WrongSlack,
-    /// One device gets stuck, jumps, dies, returns or babbles.
+    /// One device gets stuck, jumps, dies, dies and returns, or babbles.
     Broken,
 }
 
-/// All conditions with their names in the table.
+/// All conditions with the names that the table uses.
 pub const CONDITIONS: [(&str, Condition); 16] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
@@ -134,28 +135,28 @@ pub const CONDITIONS: [(&str, Condition); 16] = [
     ("broken", Condition::Broken),
 ];
 
-/// Start of a dive: its name and chainage, m.
+/// Start of a dive: name and chainage, m.
 pub type Place = (&'static str, f64);
 
-/// Start places; shorter tunnels use a share of the chainage ([`Vehicle::far_share`]).
+/// Places at which dives start. Shorter tunnels use a fraction of the chainage ([`Vehicle::far_share`]).
 pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900.0)];
 
-/// Speed and driving of a dive.
+/// Driving of a dive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Driven {
-    /// At the speed from `plan --write` for mode and target.
+    /// At the speed from `plan --write` for this mode and target.
     Planned,
-    /// The same, after the vehicle has been stationary at its start.
+    /// As `Planned`, after a stationary phase at the start.
     Stood,
-    /// At this factor times the largest speed of Eq. 16, with planned phases.
+    /// At this multiple of the largest speed by Eq. 16, with planned phases.
     Times(f64),
-    /// By a pilot who follows the live advice within 5 % and 3 s later, and never goes back.
+    /// By a pilot who never goes back and follows the live advice within 5 %, with a delay of 3 s.
     Advised,
-    /// By a pilot who drives at 1.2 times the speed of Eq. 16, and then goes back for every missed section.
+    /// By a pilot who drives at 1.2 times the speed by Eq. 16, and afterwards goes back for every missed section.
     Back,
 }
 
-/// All ways of driving with their names in the table.
+/// All kinds of driving with the names that the table uses.
 pub const DRIVEN: [(&str, Driven); 5] = [
     ("planned", Driven::Planned),
     ("stood", Driven::Stood),
@@ -173,7 +174,7 @@ pub struct Cell {
     pub condition: Condition,
     /// Chainage of the start, m.
     pub start_m: f64,
-    /// Chainage of its launch, if it drives from there to `start_m`, m.
+    /// Chainage of the launch, m, if the vehicle drives from there to `start_m`.
     pub let_in_m: Option<f64>,
     /// Driving.
     pub driven: Driven,
@@ -187,8 +188,8 @@ pub struct CellDive {
     pub believed: Scene,
 }
 
-/// Noise and resolution of the depth sensor, and scatter of a compass; heads and echosounders have tables of their
-/// own. Source: `replay/simulator/src/implied_effects/data_sheets.rs`.
+/// Noise and resolution of the depth sensor; heads and echosounders have separate tables. Source:
+/// `replay/simulator/src/implied_effects/data_sheets.rs`.
 const DEPTH: &str = "depth_steps = {}\ndepth_noise = { noise_pa = 152 }\n";
 /// Noise and biases of the units. Source: `plugins/imu_can/src/noise.rs`, and the defaults of `[navigation]` in
 /// docs/reference/vehicle-file.md.
@@ -208,23 +209,24 @@ const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
 const TAUT: &str = "slack_sd_m = 0.003\nslack_time_s = 10\n";
 const HANGS: &str = "slack_sd_m = 0.06\nslack_time_s = 10\n";
 
-/// Settings of the vehicle file that state the noises of the `DataSheet` effects. They cover heads (resolution 2 cm,
-/// noise 1 cm, range 10 m), echosounders, depth (152 Pa) and attitudes. Cable and scale have next to none. Inertial
-/// units state theirs by their preset.
+/// Settings of the vehicle file that state the noises of the `DataSheet` effects.
+///
+/// They cover heads (resolution 2 cm, noise 1 cm, range 10 m), echosounders, depth (152 Pa) and attitudes. Cable and
+/// scale have almost no noise. The preset of an inertial unit states its noise.
 const TRUE_NOISES: &str = "return_sd_m = 0.0116\necho_sd_m = 0.02\ndepth_sd_m = 0.0155\ntilt_sd_deg = 0.3\nattitude_sd_deg = 0.3\n\
      heading_sd_deg = 0.3\ndeviation_deg = 0.01\ntether_sd_m = 0.0001\nslack_sd_m = 0.0001\nslack_time_s = 10\ntether_scale_sd = 0.00001\n";
 
-/// Standard deviation of a rough wall, m. Together with the heads' own noise it gives the 3 cm that vehicle files
+/// Standard deviation of a rough wall, m. Together with the noise of the heads, it gives the 3 cm that vehicle files
 /// allow for.
 const ROUGH_M: f64 = 0.028;
 
-/// Largest deviation of the wall from the design, m: the sum of some lining tolerances.
+/// Largest deviation of the wall from the design, m: the sum of several lining tolerances.
 const OFF_DESIGN_M: f64 = 0.06;
 
-/// Stationary time before a dive that begins with a stop, s.
+/// Duration of the stationary phase at the start of a dive, s.
 const STANDS_S: f64 = 30.0;
 
-/// Speed on the way from the launch to the start, m/s.
+/// Speed from the launch to the start, m/s.
 const WAY_MPS: f64 = 0.3;
 
 impl Cell {
@@ -239,7 +241,7 @@ impl Cell {
         CellDive { scene: parse(&text, &truly, seed), believed: parse(&text, &told, seed) }
     }
 
-    /// Planned speed over the speed of Eq. 16.
+    /// Ratio of the planned speed to the speed of Eq. 16.
     pub fn plan_share(&self) -> f64 {
         self.plan_mps(&self.plain(1, 1.0).vehicle) / self.vehicle.edge_mps
     }
@@ -256,7 +258,7 @@ impl Cell {
         parse(&self.text(seed, length_m, 0.1, ""), &self.told(), seed)
     }
 
-    /// The vehicle file that headrace reads, without the planned speed.
+    /// Text of the vehicle file that headrace reads, with a placeholder for the planned speed.
     fn told(&self) -> String {
         let Vehicle { file, mode, target_m, layout, .. } = self.vehicle;
         let text = String::from_utf8(scenes::vehicle_file(file).unwrap()).unwrap();
@@ -272,8 +274,8 @@ impl Cell {
         told.replace("[heads]", &format!("[navigation]\n{}\n[heads]", self.told_navigation()))
     }
 
-    /// Navigation settings that state the cable's slack and the unit's noise, for conditions in which the pilot knows
-    /// them.
+    /// Navigation settings that state the slack of the cable and the noise of the unit, if the pilot knows them in
+    /// this condition.
     fn told_navigation(&self) -> String {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),
@@ -289,7 +291,7 @@ impl Cell {
             told.replace("counts_per_metre = 2000", &format!("counts_per_metre = {count:.1}"))
         };
         match self.condition {
-            // The counter reads less than stated, so that no chainage lies beyond the tunnel's end.
+            // The counter reads less than its nominal scale, so that no chainage lies beyond the tunnel's end.
             Condition::Poor => counts(0.995),
             Condition::WrongCable => counts(0.98),
             Condition::WrongMount => {
@@ -306,7 +308,7 @@ impl Cell {
         match self.driven {
             Driven::Planned | Driven::Stood => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
-            // The largest speed that the pilot would drive.
+            // The pilot may drive at up to this speed.
             Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
         }
     }
@@ -367,7 +369,7 @@ impl Cell {
         )
     }
 
-    /// Bulges and hollows all round the wall, two per metre.
+    /// Bulges and hollows around the whole wall, two per metre of tunnel.
     fn as_built(&self, seed: u64, length_m: f64) -> String {
         let most_m = self.aside_m(OFF_DESIGN_M);
         let mut draw = Draw::new(seed ^ 0xb17);
@@ -375,7 +377,7 @@ impl Cell {
         let mut text = String::new();
         for _ in 0..math::round_to_i64(2.0 * (to_m - from_m)) {
             let [long_m, wide_m] = [draw.between(2.0, 6.0), self.aside_m(draw.between(1.0, 4.0))];
-            // None begins before the tunnel's start.
+            // No bulge begins before the tunnel's start.
             let at_m = draw.between(from_m, to_m).max(0.1 + long_m / 2.0);
             let [depth_m, arc_m] = [draw.between(-most_m, most_m), self.aside_m(draw.between(0.0, 36.0))];
             writeln!(
@@ -388,7 +390,7 @@ impl Cell {
         text
     }
 
-    /// Offset from the centre line that keeps clear of a pipe's wall, m.
+    /// Limits an offset from the centre line, m, so that it keeps clear of the wall of a narrow pipe.
     fn aside_m(&self, most_m: f64) -> f64 {
         if self.vehicle.name == "pipe" { 0.3 * most_m } else { most_m }
     }
@@ -429,8 +431,10 @@ impl Cell {
         }
     }
 
-    /// Murky stretches of 5 to 20 m, 2 to 6 m apart. In them 10 to 30 % of the heads' returns are lost in runs. 5 %
-    /// come from clusters before the wall, and some by way of a second wall. Source: field.md, "murk".
+    /// Murky stretches of 5 to 20 m length with gaps of 2 to 6 m.
+    ///
+    /// In these stretches, 10 to 30 % of the heads' returns are missing, in series. Clusters before the wall cause 5
+    /// % of the returns, and second echoes cause some. Source: field.md, "murk".
     fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
         if self.condition != Condition::Murk {
             return String::new();
@@ -455,7 +459,7 @@ impl Cell {
         murk
     }
 
-    /// Effect of the condition's single error or broken device.
+    /// Effect of the condition's single wrong setting or broken device.
     fn wrong(&self, plain: &Scene, seed: u64, duration_s: f64) -> String {
         let mut draw = Draw::new(seed);
         match self.condition {

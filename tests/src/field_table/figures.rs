@@ -8,7 +8,7 @@ use headrace_simulator::Scene;
 use crate::field::rms;
 use crate::truth::{JudgedDive, JudgedSection};
 
-/// Kinds of sources that have innovations, by name.
+/// Kinds of sources with innovations, by name.
 pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
     ("head", Sense::Head),
     ("ping", Sense::Echosounder),
@@ -17,12 +17,12 @@ pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
     ("tether", Sense::Tether),
     ("dvl", Sense::Velocity),
 ];
-/// Length at the ends of a dive, beyond the target, in which sections miss neighbours on one side, m. It covers the
-/// hull and the distance to the next pass.
+/// Length at each end of a dive in which sections have neighbours on one side only, in addition to the target, m. It
+/// covers the hull and the distance to the next pass.
 const END_M: f64 = 2.0;
-/// A hole belongs to a section if its centre is farther than this from the section's bounds, m.
+/// A hole belongs to a section if its centre is at least this far from both bounds of the section, m.
 const FLANK_M: f64 = 0.005;
-/// A section counts as entered if the vehicle reaches farther into it than this, m.
+/// A section counts as entered if the vehicle reaches at least this far into it, m.
 const TOUCH_M: f64 = 0.02;
 
 /// A section that passed although its true hole exceeds the target.
@@ -32,9 +32,9 @@ pub struct FalsePass {
     pub seed: u64,
     /// Chainage of the section's start, m.
     pub start_m: f64,
-    /// Diameter of its hole, m: as reported, standard deviation, true.
+    /// Diameter of the hole, m: reported value, its standard deviation, and true value.
     pub hole_m: [f64; 3],
-    /// Reported place of the hole, chainage and clock.
+    /// Reported position of the hole: chainage and clock position.
     pub at: (f64, String),
     /// Number of returns that weren't accepted as wall.
     pub doubtful: u32,
@@ -45,38 +45,39 @@ pub struct FalsePass {
 pub struct Figures {
     /// Number of dives.
     pub dives: u32,
-    /// Number of sections, with those at the ends.
+    /// Number of sections, including sections at the ends of dives.
     pub sections: u32,
-    /// Sections with D_true over the target.
+    /// Number of sections with D_true over the target.
     pub over: u32,
-    /// Passed sections with D_true over the target.
+    /// Number of passed sections with D_true over the target.
     pub passed_over: u32,
-    /// Passed sections with D_true over 1.1 times the target.
+    /// Number of passed sections with D_true over 1.1 times the target.
     pub passed_far: u32,
-    /// Every passed section with D_true over the target.
+    /// All passed sections with D_true over the target.
     pub falsely: Vec<FalsePass>,
-    /// Sections with D_true below 0.9 times the target.
+    /// Number of sections with D_true below 0.9 times the target.
     pub under: u32,
-    /// Failed sections with D_true below 0.9 times the target.
+    /// Number of failed sections with D_true below 0.9 times the target.
     pub failed_under: u32,
-    /// Length without the ends, m.
+    /// Total inner length, which excludes the ends of dives, m.
     pub inner_m: f64,
-    /// Length without the ends by verdict, m: passed, failed, can't say, open.
+    /// Inner length by verdict, m: passed, failed, can't say, open.
     pub verdicts_m: [f64; 4],
-    /// Length without the ends with D_true within the target, m.
+    /// Inner length with D_true within the target, m.
     pub passable_m: f64,
-    /// D less D_true, and its standard deviation, of each inner section with a bounded hole of its own, m.
+    /// D minus D_true, and the standard deviation of D, m. Contains each inner section with a bounded hole of its
+    /// own.
     pub errors: Vec<[f64; 2]>,
-    /// Number of measurements used and sum of their normalised innovations squared, by kind of source.
+    /// Number of used measurements, and sum of their normalised innovations squared, by kind of source.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
-    /// Advised speeds away from the ends, m/s.
+    /// Advised speeds, without those near the ends of dives, m/s.
     pub advised_mps: Vec<f64>,
-    /// Length of the vehicle's trajectory, and the part of it with a section in the report, m.
+    /// Length of the vehicle's trajectory, and length of its part with sections in the report, m.
     pub way_m: [f64; 2],
 }
 
 impl Figures {
-    /// Adds a dive, from the chainage `from_m` on.
+    /// Adds the part of a dive beyond the chainage `from_m`.
     pub fn add(&mut self, dive: &JudgedDive, scene: &Scene, from_m: f64) {
         self.dives += 1;
         let target_m = dive.report.target_m;
@@ -156,7 +157,8 @@ impl Figures {
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        // A circle centred on a bound is the flank of a neighbour's hole; its distance counts twice.
+        // A circle centred on a section's bound belongs to the hole of the neighbouring section, which it would count
+        // twice.
         let is_own = section
             .report
             .hole_x_m
@@ -181,7 +183,7 @@ impl Figures {
         }
     }
 
-    /// Adds the reported length: the part of the estimated chainage that has a section.
+    /// Adds the length of the trajectory, and the length of its part that has sections in the report.
     fn tell(&mut self, dive: &JudgedDive) {
         let section_m = dive.report.section_m;
         let [Some(first), Some(last)] = [dive.sections.first(), dive.sections.last()] else {
@@ -189,7 +191,7 @@ impl Figures {
             return;
         };
         let from = math::floor_to_i64((dive.truth.way_m[0] - first.shift_m) / section_m);
-        // A trajectory that ends where a section begins doesn't enter it.
+        // A trajectory doesn't enter the section that begins at the trajectory's end.
         let to = math::floor_to_i64((dive.truth.way_m[1] - last.shift_m - TOUCH_M) / section_m);
         let mut told: Vec<i64> = dive
             .sections
@@ -202,17 +204,17 @@ impl Figures {
         self.way_m[1] += told as f64 * section_m;
     }
 
-    /// Share of the inner length with a verdict, by its number: passed, failed, can't say, open.
+    /// Fraction of the inner length with this verdict, by number: passed, failed, can't say, open.
     pub fn share(&self, verdict: usize) -> f64 {
         self.verdicts_m[verdict] / self.inner_m
     }
 
-    /// Share of the inner length with D_true within the target.
+    /// Fraction of the inner length with D_true within the target.
     pub fn passable(&self) -> f64 {
         self.passable_m / self.inner_m
     }
 
-    /// Root mean square of errors over standard deviations.
+    /// Root mean square of the ratio of errors to their standard deviations.
     pub fn ratio_rms(&self) -> f64 {
         if self.errors.is_empty() {
             f64::NAN
@@ -221,7 +223,7 @@ impl Figures {
         }
     }
 
-    /// Share of errors within this many standard deviations.
+    /// Fraction of errors within this many standard deviations.
     pub fn within(&self, sigmas: f64) -> f64 {
         let within = self.errors.iter().filter(|[error_m, sd_m]| error_m.abs() <= sigmas * sd_m).count();
         within as f64 / self.errors.len() as f64
@@ -242,24 +244,24 @@ impl Figures {
         median(self.advised_mps.iter().copied())
     }
 
-    /// Mean normalised innovation squared of a kind of sources, by its number.
+    /// Mean normalised innovation squared of one kind of source, by number.
     pub fn nis(&self, kind: usize) -> Option<f64> {
         let (used, sum) = self.innovations[kind];
         (used > 0.0).then(|| sum / used)
     }
 
-    /// Share of sections over the target that passed.
+    /// Fraction of sections with D_true over the target that passed.
     pub fn false_passes(&self) -> f64 {
         f64::from(self.passed_over) / f64::from(self.over.max(1))
     }
 
-    /// Share of sections below 0.9 times the target that failed.
+    /// Fraction of sections with D_true below 0.9 times the target that failed.
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }
 }
 
-/// Median; not a number without values.
+/// Median of the values; NaN without values.
 fn median(of: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = of.collect();
     all.sort_by(f64::total_cmp);

@@ -1,4 +1,5 @@
-//! The table of field dives: vehicles under conditions at places, each dive compared with its truth.
+//! The table of field dives, in which each vehicle dives under several conditions at several places. Each dive is
+//! compared with the truth.
 
 pub mod breaking;
 mod cells;
@@ -9,7 +10,7 @@ pub use figures::{FalsePass, Figures, KINDS_OF_SOURCES};
 
 use crate::truth;
 
-/// Figures of a cell's dives with these seeds and this length.
+/// Figures of a cell over dives with these seeds and this length.
 pub fn figures(cell: &Cell, seeds: impl IntoIterator<Item = u64>, length_m: f64) -> Figures {
     let mut figures = Figures::default();
     for seed in seeds {

@@ -1,4 +1,5 @@
-//! Dives with injected causes: drawn from a seed, with their files when some of the causes are removed.
+//! Dives with injected causes, drawn from a seed. Writes their vehicle and scene files with any of the causes
+//! removed.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -10,12 +11,13 @@ use crate::random_dives::Draw;
 
 /// Chainage at which dives begin, m.
 pub(super) const START_M: f64 = 3.0;
-/// Distance that a vehicle goes on beyond the far end, m. One that turns back too early returns by it instead.
+/// Distance that a vehicle drives beyond the far end, m. A vehicle that turns back too early drives back by this
+/// distance.
 const ON_M: f64 = 4.5;
-/// Distance over which the vehicle rolls before a rolled pass, m.
+/// Distance in which the vehicle rolls before a rolled pass, m.
 const ROLLS_OVER_M: f64 = 1.0;
 
-/// Sensors that give a position; no hull hides them.
+/// Sensors for the position. No part of the hull hides them.
 const SENSORS: &str = r#"[[sensors]]
 id = "left"
 plugin = "ping1d"
@@ -53,15 +55,15 @@ counts_per_metre = 2000
 #[expect(missing_docs, reason = "the variants name their fields")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Injected {
-    /// A stretch driven at this multiple of the speed.
+    /// A stretch at this multiple of the speed.
     TooFast { over_m: [f64; 2], factor: f64 },
     /// A mode with coarser steps.
     AngularStep { mode: &'static str },
-    /// Missing returns, with the keys of the effect.
+    /// Missing returns; the keys belong to the effect.
     MissingReturns { keys: String },
     /// A range setting shorter than the distance to the wall, m.
     OutOfRange { range_m: u32 },
-    /// Parts in the beams' way are real. Vehicle files declare them anyway.
+    /// Real parts of the vehicle in front of the beams. Vehicle files declare these parts in any case.
     Occluded,
     /// Offset from the centre line by [y, z], m.
     Aside { over_m: [f64; 2], by_m: [f64; 2] },
@@ -69,13 +71,13 @@ pub enum Injected {
     Swing { over_m: [f64; 2], yaw_deg: f64, every_s: f64 },
     /// Phase offsets of the heads, degrees.
     Phase { offsets_deg: Vec<f64> },
-    /// A head stalls now and then.
+    /// A head that stalls now and then.
     HeadStalled { head: usize, per_hour: f64 },
-    /// Heads are silent over a stretch.
+    /// Silence of heads over a stretch.
     HeadSilent { heads: Vec<usize>, over_m: [f64; 2] },
-    /// The source of position is silent over a stretch.
+    /// Silence of the position sensor over a stretch.
     PositionLost { sensor: &'static str, over_m: [f64; 2] },
-    /// The vehicle turns back before the end.
+    /// A vehicle that turns back before the end.
     NotPassed,
 }
 
@@ -115,7 +117,7 @@ struct Tunnel {
 pub struct Drawn {
     /// Seed.
     pub seed: u64,
-    /// Number of the noise that its effects draw.
+    /// Seed of the noise in the dive's effects.
     noise: u64,
     /// Injected causes.
     pub injected: Vec<Injected>,
@@ -123,9 +125,9 @@ pub struct Drawn {
     pub end_m: f64,
     /// Speed without injected causes, m/s.
     pub speed_mps: f64,
-    /// Target T, m; an estimate at first.
+    /// Target T, m; only an estimate until the dive has been simulated.
     pub target_m: f64,
-    /// Target over the largest hole without injected causes.
+    /// Ratio of the target to the largest hole without injected causes.
     pub margin: f64,
     tunnel: Tunnel,
     mode: &'static str,
@@ -133,16 +135,16 @@ pub struct Drawn {
     heads: Vec<String>,
     hull: &'static str,
     way: &'static str,
-    /// Whether heads hide the wall from each other, independent of injected causes.
+    /// Whether heads hide the wall from each other in addition to the injected causes.
     in_each_others_way: bool,
     swaying: bool,
     /// A stretch with a speed limit, m/s.
     at_most: Option<([f64; 2], f64)>,
-    /// A stretch passed again at the end, rolled by this angle to each side, degrees.
+    /// A stretch that is passed again at the end, and the roll angle to each side, degrees.
     again: Option<([f64; 2], f64)>,
 }
 
-/// Turn time, seconds, and step, degrees, of each mode. Source: Jorge et al. 2021, Table 2.
+/// Turn time in seconds and step in degrees of each mode. Source: Jorge et al. 2021, Table 2.
 const MODES: [(&str, f64, f64); 4] =
     [("medium", 10.8, 0.6), ("fast", 8.0, 0.9), ("faster", 6.6, 1.2), ("fastest", 4.8, 2.4)];
 
@@ -177,7 +179,7 @@ fn tunnel(draw: &mut Draw) -> Tunnel {
     }
 }
 
-/// Positions of the heads: in a line along the hull, or side by side in front and aft.
+/// Positions of the heads: in a line along the hull, or in a front pair and an aft pair side by side.
 fn heads(count: usize, side_by_side: bool) -> Vec<String> {
     let place = |head: usize| {
         if !side_by_side {
@@ -206,7 +208,7 @@ pub const KINDS: [Cause; 11] = [
 ];
 
 impl Drawn {
-    /// The dive of a seed with these kinds of causes, by their numbers in [`KINDS`].
+    /// The dive of a seed with these kinds of causes, given as indices of [`KINDS`].
     pub fn of(seed: u64, kinds: &[usize]) -> Self {
         let mut draw = Draw::new(seed);
         let causes: Vec<Cause> = kinds.iter().map(|kind| KINDS[*kind]).collect();
@@ -221,7 +223,7 @@ impl Drawn {
         let mode = if has(Cause::AngularStep) { 1 + draw.below(2) } else { draw.below(4) };
         let (mode, turn_s, step_deg) = MODES[mode];
         let step_m = tunnel.far_m * step_deg.to_radians();
-        // Distance between passes over the steps along the wall.
+        // Ratio of the distance between passes to the step along the wall.
         let ratio = if has(Cause::AngularStep) { draw.between(0.8, 1.1) } else { draw.between(2.5, 5.0) };
         let gap_s = turn_s / count as f64;
         let speed_mps = (ratio * step_m / gap_s).clamp(0.03, 0.35);
@@ -251,14 +253,15 @@ impl Drawn {
         drawn
     }
 
-    /// The same dive with another noise, by its number.
+    /// The same dive with another noise, selected by number.
     #[must_use]
     pub fn with_noise(&self, noise: u64) -> Self {
         Self { noise: self.seed + 1_000_000 * noise, ..self.clone() }
     }
 
-    /// The same dive without these causes, and with a speed limit on a stretch (m/s). It is passed again, rolled by
-    /// an angle (degrees), if one is given.
+    /// The same dive without these causes and with a speed limit (m/s) on a stretch.
+    ///
+    /// If a roll angle (degrees) is given, the vehicle also passes this stretch again, rolled by this angle.
     #[must_use]
     pub fn changed(
         &self,
@@ -314,7 +317,7 @@ impl Drawn {
             },
             Cause::Phase => {
                 let mut offsets_deg = vec![0.0; count];
-                // All heads but the first are nearly in phase with each other.
+                // All heads are almost in phase with the first head, so they leave gaps.
                 for (head, offset_deg) in offsets_deg.iter_mut().enumerate().skip(1) {
                     let together_deg = 360.0 * head as f64 / count as f64;
                     *offset_deg = math::wrap_signed(together_deg * draw.between(0.7, 1.0), 360.0);
@@ -417,8 +420,8 @@ impl Drawn {
         let last_m = if turns_back { self.end_m - ON_M } else { self.end_m + ON_M };
         points.push(self.point(&|_| false, last_m, last_m));
         if let Some(([from_m, to_m], roll_deg)) = self.again {
-            // Heads apart along the hull are in phase in the forward direction only, so a pass rolled to each side
-            // needs two forward runs.
+            // Heads that are apart along the hull are in phase in the forward direction only. So a pass rolled to
+            // each side needs two forward runs.
             let from_m = from_m.max(START_M);
             let to_m = to_m.min(self.end_m + ON_M);
             let sides_deg: &[f64] = if roll_deg > 0.0 { &[-roll_deg, roll_deg] } else { &[0.0] };
@@ -446,7 +449,7 @@ impl Drawn {
                 Injected::TooFast { over_m, factor } if (over_m[0]..over_m[1]).contains(&before_m) => {
                     point.speed_mps *= factor;
                 }
-                // The offset is reached, and left again, within the distance to the neighbouring points.
+                // The vehicle moves to the offset and back on the way between neighbouring points.
                 Injected::Aside { over_m, by_m } if (over_m[0]..=over_m[1]).contains(&x_m) => {
                     point.place_m = [point.place_m[0] + by_m[0], point.place_m[1] + by_m[1]];
                 }
@@ -466,7 +469,7 @@ impl Drawn {
     }
 }
 
-/// A point of a path, with the speed on the way to it.
+/// A point of a path, with the speed towards it.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     x_m: f64,
@@ -492,7 +495,7 @@ impl Path {
         text
     }
 
-    /// Time at which the vehicle first reaches a chainage, seconds of the dive.
+    /// Time at which the vehicle first reaches a chainage, seconds after the start of the dive.
     fn time_s(&self, x_m: f64) -> f64 {
         let mut at_s = 0.0;
         for pair in self.0.windows(2) {

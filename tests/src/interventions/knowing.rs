@@ -1,7 +1,7 @@
-//! Upper bound for finding causes, from a reference that knows the injected causes.
+//! Upper bound on correct causes, from a reference that knows the injected causes.
 //!
-//! The reference simulates the same dive without each cause, with other noise than the judge. The share of its right
-//! answers bounds the answers of any method.
+//! The reference simulates the same dive without each cause, but with other noise than the judged dive. Its fraction
+//! of right answers is an upper bound for any method.
 
 use std::collections::BTreeMap;
 
@@ -10,20 +10,21 @@ use headrace_coverage::Cause;
 use super::matrix::Count;
 use super::{InterventionDive, Right, hole_at_m, report, right};
 
-/// Number of noises that the reference tries.
+/// Number of noise seeds that the reference tries.
 const NOISES: u64 = 3;
 
-/// Right answers of the reference for dives with two causes; it knows everything but the noise.
+/// Number of right answers of the reference for dives with two causes. The reference knows everything except the
+/// noise.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct UpperBound {
     /// All stretches.
     pub stretches: Count,
-    /// Stretches whose true set has two causes.
+    /// Stretches that truly have two causes.
     pub pairs: Count,
 }
 
 impl UpperBound {
-    /// Adds a dive; dives with a single cause are ignored.
+    /// Adds a dive. Ignores dives with a single cause.
     pub fn add(&mut self, dive: &InterventionDive) {
         if dive.drawn.injected.len() < 2 {
             return;
@@ -48,7 +49,7 @@ impl UpperBound {
         }
     }
 
-    /// Returns the sum.
+    /// Returns the sum of both counts.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self { stretches: self.stretches.and(other.stretches), pairs: self.pairs.and(other.pairs) }
@@ -56,7 +57,7 @@ impl UpperBound {
 }
 
 impl InterventionDive {
-    /// Right sets of causes of each section, simulated with another noise.
+    /// Right sets of causes of each section, from simulations with another noise.
     fn with_noise(&self, noise: u64) -> Vec<Right> {
         let drawn = self.drawn.with_noise(noise);
         let without = [0, 1].map(|k| report(&drawn, &|other| other != k));

@@ -1,4 +1,4 @@
-//! Confusion matrix: displayed causes against true ones.
+//! Confusion matrix of displayed and true causes.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -7,7 +7,7 @@ use headrace_coverage::Cause;
 
 use super::{InterventionDive, Right};
 
-/// Counts of answers.
+/// Counts of all answers and of right answers.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Count {
     /// Number of answers.
@@ -22,7 +22,7 @@ impl Count {
         self.right += u32::from(right);
     }
 
-    /// Returns the sum.
+    /// Returns the sum of both counts.
     #[must_use]
     pub(super) fn and(self, other: Self) -> Self {
         Self { all: self.all + other.all, right: self.right + other.right }
@@ -33,30 +33,30 @@ impl Count {
         format!("{} of {} ({:.1} %)", self.right, self.all, 100.0 * self.share())
     }
 
-    /// Share of right answers; 1 without answers.
+    /// Fraction of right answers; 1 without answers.
     pub fn share(self) -> f64 {
         if self.all == 0 { 1.0 } else { f64::from(self.right) / f64::from(self.all) }
     }
 }
 
-/// Displayed against true causes, for dives with one cause and with two, by section and by stretch.
+/// Comparison of displayed with true causes by section and by stretch, for dives with one cause and with two.
 #[derive(Debug, Default)]
 pub struct Matrix {
-    /// Sections, by number of injected causes less one.
+    /// Sections; the index is the number of injected causes minus one.
     pub sections: [Count; 2],
-    /// Stretches, by number of injected causes less one.
+    /// Stretches; the index is the number of injected causes minus one.
     pub stretches: [Count; 2],
-    /// Stretches whose true set has two causes.
+    /// Stretches that truly have two causes.
     pub pairs: Count,
-    /// Stretches whose true set has two causes, displayed right or nearly right: see [`super::Judged::is_close`].
+    /// Stretches that truly have two causes. A nearly right answer counts as right: see [`super::Judged::is_close`].
     pub close_pairs: Count,
-    /// Stretches displayed as at most one run.
+    /// Stretches that are displayed as one run at most.
     pub one_run: Count,
-    /// Dives without a failed section.
+    /// Number of dives without a failed section.
     pub idle: u32,
-    /// Sections and stretches by true and displayed cause, for dives with one cause.
+    /// Number of sections and of stretches by true and displayed cause, for dives with one cause.
     told: BTreeMap<(String, String), [u32; 2]>,
-    /// Wrong ones by true and displayed cause, for dives with two causes.
+    /// Number of wrong stretches by true and displayed cause, for dives with two causes.
     wrong: BTreeMap<(String, String), u32>,
 }
 

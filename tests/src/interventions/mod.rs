@@ -1,8 +1,8 @@
-//! Judges displayed causes by intervention: dives are simulated with and without each of their injected causes.
+//! Judges displayed causes by intervention: each dive is simulated with and without each of its injected causes.
 //!
-//! The true cause of a failed section is the injected one whose removal brings its hole within the target. If both of
-//! two must be removed, their set is the true cause. If removing either is enough, either is right. Only simulations
-//! decide; the program's search for causes isn't used.
+//! The true cause of a failed section is the injected cause whose removal brings the hole within the target. If both
+//! of two causes must be removed, both together are the true cause. If the removal of either one is enough, either
+//! one is right. Only simulations decide, not the program's search for causes.
 
 mod draw;
 mod knowing;
@@ -18,7 +18,7 @@ pub use knowing::UpperBound;
 pub use matrix::Matrix;
 pub use remedy::remedies;
 
-/// Sections this near to the ends of the trajectory are left out, m: they fail with any cause.
+/// Sections this near to the ends of the trajectory are left out, m, because they always fail.
 const END_M: f64 = 2.0;
 /// Failed sections this near to each other form one stretch, m.
 const JOIN_M: f64 = 0.5;
@@ -26,23 +26,23 @@ const JOIN_M: f64 = 0.5;
 /// A hole up to this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
-/// Alternative sets of causes, each sorted; any of them is right.
+/// Alternative sets of causes, each one sorted. Any of these sets is right.
 pub type Right = Vec<Vec<Cause>>;
 
-/// A failed section with its true and its displayed causes.
+/// A failed section with true and displayed causes.
 #[derive(Debug, Clone)]
 pub struct Judged {
-    /// Chainage of its start and end, m.
+    /// Chainage of the section's start and end, m.
     pub ends_m: [f64; 2],
     /// Sets of causes that are right.
     pub right: Right,
     /// Displayed causes, sorted.
     pub told: Vec<Cause>,
-    /// Number of its run.
+    /// Number of the section's run.
     pub run: Option<u32>,
-    /// Diameter of its hole, m.
+    /// Diameter of the hole, m.
     pub hole_m: f64,
-    /// Diameter without each of the injected causes alone, m; infinite if the hole can't be measured.
+    /// Diameter of the hole without each single injected cause, m; infinite if the hole can't be measured.
     pub without_m: Vec<f64>,
     /// Evidence for the displayed causes.
     pub evidence: Evidence,
@@ -54,7 +54,8 @@ impl Judged {
         self.right.contains(&self.told)
     }
 
-    /// Whether an injected cause is displayed, and the right answer depends on less than a twentieth of the target.
+    /// Whether an injected cause is displayed that is nearly right: without it, the hole exceeds the target by 5 % at
+    /// most.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)
@@ -67,20 +68,20 @@ pub struct InterventionDive {
     pub drawn: Drawn,
     /// Report with all injected causes.
     pub report: Report,
-    /// Failed sections that the injected causes explain.
+    /// Failed sections that the injected causes can explain.
     pub sections: Vec<Judged>,
 }
 
-/// A stretch: neighbouring failed sections with a common right answer.
+/// A stretch: neighbouring failed sections that share a right answer.
 pub struct Stretch<'a> {
-    /// Its sections.
+    /// Sections of the stretch.
     pub sections: &'a [Judged],
-    /// Sets that are right for all of its sections.
+    /// Sets of causes that are right for all sections of the stretch.
     pub right: Right,
 }
 
 impl Stretch<'_> {
-    /// Causes displayed for most of it.
+    /// Causes that are displayed for most sections of the stretch.
     pub fn told(&self) -> &[Cause] {
         let count = |told: &[Cause]| self.sections.iter().filter(|section| section.told == told).count();
         self.sections
@@ -90,7 +91,7 @@ impl Stretch<'_> {
             .unwrap_or(&[])
     }
 
-    /// Number of runs that it is displayed as.
+    /// Number of runs in which the stretch is displayed.
     pub fn runs(&self) -> usize {
         let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
         runs.sort_unstable();
@@ -114,7 +115,7 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     let is_inner = |section: &&SectionReport| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
-    // Holes don't depend on the target, but verdicts do.
+    // The target may be changed here: holes don't depend on it. All later reports use it for their verdicts.
     let all = report(&drawn, &|_| true);
     let without: Vec<Report> = match kinds {
         [_, _] => (0..2).map(|k| report(&drawn, &|other| other != k)).collect(),
@@ -165,7 +166,7 @@ fn told(evidence: &Evidence) -> Vec<Cause> {
     evidence.causes.iter().collect()
 }
 
-/// Right sets of causes; `None` if the section fails without any of them.
+/// Right sets of causes; `None` if the section fails even without all injected causes.
 fn right(drawn: &Drawn, alone: &[bool], together: bool) -> Option<Right> {
     if !together {
         return None;
@@ -206,13 +207,13 @@ impl InterventionDive {
     }
 }
 
-/// Kinds injected into the dive with this number: one in every other dive, two in the others, in rotation.
+/// Kinds of causes in the dive with this number. Dives with even numbers have one cause, all others two, in rotation.
 pub fn kinds(seed: u64) -> Vec<usize> {
     let number = usize::try_from(seed).unwrap();
     if number.is_multiple_of(2) {
         return vec![number / 2 % KINDS.len()];
     }
-    // All pairs in rotation.
+    // All pairs of causes take turns.
     let pairs: Vec<[usize; 2]> =
         (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
     pairs[number / 2 * 17 % pairs.len()].to_vec()

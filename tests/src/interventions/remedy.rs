@@ -1,13 +1,13 @@
-//! Simulates the displayed remedy of each run, to see whether its sections pass.
+//! Simulates the displayed remedy of each run, to find out whether the run's sections then pass.
 
 use headrace_coverage::Action;
 use headrace_monitor::report::ReturnReport;
 
 use super::{Injected, InterventionDive, Judged, hole_at_m, report};
 
-/// Length added at either end of a stretch that is passed otherwise, m: heads sit apart along the hull.
+/// Length added at either end of a stretch that is passed again, m, because heads are apart along the hull.
 const ROOM_M: f64 = 2.0;
-/// Roll angle for a vehicle that hides the wall from its own heads, degrees.
+/// Roll angle of a vehicle that hides the wall from its own heads, degrees.
 const ROLLED_DEG: f64 = 75.0;
 
 /// A run with its displayed remedy, and the result of the remedy.
@@ -15,9 +15,9 @@ const ROLLED_DEG: f64 = 75.0;
 pub struct Remedied {
     /// Displayed remedy.
     pub told: ReturnReport,
-    /// Start and new hole diameter of each of its sections, m; infinite if it can't be measured.
+    /// Start and new hole diameter of each section in the run, m; infinite if the hole can't be measured.
     pub then_m: Vec<[f64; 2]>,
-    /// Whether all of its sections meet the target afterwards.
+    /// Whether all sections of the run meet the target after the remedy.
     pub clears: bool,
 }
 
@@ -37,7 +37,7 @@ fn mends(action: Action, injected: &Injected) -> bool {
     }
 }
 
-/// Simulates the displayed remedy of each run that contains explained failed sections.
+/// Simulates the displayed remedy of each run, except runs without any section that injected causes explain.
 pub fn remedies(dive: &InterventionDive) -> Vec<Remedied> {
     let of_run = |told: &ReturnReport| -> Vec<Judged> {
         dive.sections.iter().filter(|section| section.run == Some(told.run)).cloned().collect()
@@ -58,7 +58,7 @@ fn remedy(dive: &InterventionDive, told: &ReturnReport, sections: &[Judged]) -> 
     } else {
         (has(Action::Again) && !turned_back).then_some(0.0)
     };
-    // "Slower" without a speed means the planned speed, with other settings of the heads.
+    // "Slower" without a speed means other settings of the heads at the planned speed.
     let at_most_mps =
         if told.at_most_mps > 0.0 || !has(Action::Slower) { told.at_most_mps } else { dive.drawn.speed_mps };
     let then = report(&dive.drawn.changed(&mended, over_m, at_most_mps, again_deg), &|_| true);

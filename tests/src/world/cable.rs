@@ -1,5 +1,5 @@
-//! Cables of the simulated machine: the data that the host's lines read and write, without ports, threads or a real
-//! clock.
+//! Cables of the simulated machine. They carry the data that the host's lines read and write, without ports, threads
+//! or a real clock.
 
 use std::collections::VecDeque;
 use std::io;
@@ -12,7 +12,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Host, Line, OpenError, OpenErrorKind, READ_BYTES};
 use headrace_sensor::connect::Connect;
 
-/// Errors with which an open line may fail.
+/// Errors that an open line may return.
 pub const FAILURES: [io::ErrorKind; 4] = [
     io::ErrorKind::BrokenPipe,
     io::ErrorKind::ConnectionReset,
@@ -20,7 +20,7 @@ pub const FAILURES: [io::ErrorKind; 4] = [
     io::ErrorKind::PermissionDenied,
 ];
 
-/// The world's clock, which changes only when it is set.
+/// The world's clock. Its time changes only when it is set.
 #[derive(Default)]
 pub struct Clock(AtomicU64);
 
@@ -40,7 +40,7 @@ impl Clock {
 pub struct Cable {
     /// Address at which the machine opens it.
     pub connect: Connect,
-    /// Data that has arrived at the machine and isn't read yet.
+    /// Data that has arrived at the machine and is still unread.
     pub to_host: SegQueue<Vec<u8>>,
     /// Data sent by the machine.
     pub to_device: SegQueue<Vec<u8>>,
@@ -48,17 +48,17 @@ pub struct Cable {
     pub refuses: AtomicBool,
     /// Whether writing fails.
     pub deaf: AtomicBool,
-    /// Number of times that the connection broke. Lines opened before a break fail.
+    /// Number of breaks of the connection. Lines that were opened before a break fail.
     breaks: AtomicU64,
-    /// Kind of the last break, an index of [`FAILURES`].
+    /// Kind of the last break, as an index of [`FAILURES`].
     failure: AtomicU64,
     /// Number of lines opened so far.
     opened: AtomicU64,
-    /// Datagrams that the machine dropped unread since the last query.
+    /// Number of unread datagrams that the machine has dropped since the last query.
     unread: AtomicU64,
 }
 
-/// Number of datagrams that the machine keeps for a port that doesn't read.
+/// Number of datagrams that the machine keeps for a port until somebody reads them.
 const KEPT_DATAGRAMS: usize = 400;
 
 impl Cable {
@@ -70,7 +70,7 @@ impl Cable {
         Self { connect, to_host, to_device, refuses, deaf, breaks, failure, opened, unread }
     }
 
-    /// Delivers a message of the device. Datagrams are dropped if too many wait.
+    /// Delivers a message of the device. Datagrams are dropped if too many of them are unread.
     pub fn arrive(&self, bytes: Vec<u8>) {
         if matches!(self.connect, Connect::Udp { .. }) && self.to_host.len() >= KEPT_DATAGRAMS {
             self.unread.fetch_add(1, Ordering::SeqCst);
@@ -86,7 +86,7 @@ impl Cable {
         self.breaks.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Whether the machine has the cable open, and it isn't broken.
+    /// Whether the machine has the cable open and the connection is intact.
     pub fn is_open(&self) -> bool {
         self.opened.load(Ordering::SeqCst) > self.breaks.load(Ordering::SeqCst)
     }
@@ -99,9 +99,9 @@ impl Cable {
 
 /// The machine's clock and cables.
 pub struct Machine {
-    /// Its clock.
+    /// Clock of the machine.
     pub clock: Arc<Clock>,
-    /// Its cables.
+    /// Cables of the machine.
     pub cables: Vec<Arc<Cable>>,
 }
 
@@ -128,7 +128,7 @@ struct OpenCable {
     cable: Arc<Cable>,
     clock: Arc<Clock>,
     breaks: u64,
-    /// Rest of a message that didn't fit into the last read.
+    /// Rest of a message that was longer than the last read.
     left: VecDeque<u8>,
 }
 
@@ -168,7 +168,7 @@ impl Line for OpenCable {
         self.cable.unread.swap(0, Ordering::SeqCst)
     }
 
-    /// Exchanges a message as over UDP: the answer arrives as one message with its length.
+    /// Exchanges one message as over UDP. The answer arrives as one message, too, with its own length.
     fn exchange(
         &mut self,
         write: &[u8],

@@ -1,4 +1,4 @@
-//! Emulated devices at the far ends of the cables, with the faults of their frames.
+//! Emulated devices at the far ends of the cables, with faults that affect their frames.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -22,19 +22,20 @@ pub struct Device {
     emulated: Emulated,
     cable: Arc<Cable>,
     faults: Vec<Window<CableFault>>,
-    /// Parts under way, with their arrival times.
+    /// Parts on their way to the machine, with arrival times.
     under_way: VecDeque<(MonoNs, Vec<u8>)>,
     random: Random,
-    /// Whether bytes may be split and joined anywhere, or each message arrives whole or not at all.
+    /// Whether the cable carries a byte stream, which can be split anywhere. Otherwise each message arrives whole or
+    /// never.
     is_stream: bool,
     was_broken: bool,
-    /// Whether unplanned frame losses occur.
+    /// Whether frames are also lost without a planned fault.
     loses: bool,
     whole: u64,
 }
 
 impl Device {
-    /// Creates a device that is switched on. `loses` adds unplanned frame losses.
+    /// Creates a device that is switched on. With `loses`, frames are also lost without a planned fault.
     pub fn new(
         emulated: Emulated,
         cable: Arc<Cable>,
@@ -47,7 +48,7 @@ impl Device {
         Self { emulated, cable, faults, under_way, random, is_stream, was_broken: false, loses, whole: 0 }
     }
 
-    /// Its cable.
+    /// Cable of the device.
     pub fn cable(&self) -> &Cable {
         &self.cable
     }
@@ -57,12 +58,12 @@ impl Device {
         self.whole
     }
 
-    /// Whether the cable has only delayed and split frames.
+    /// Whether the cable delays and splits frames at most.
     pub fn is_lossless(&self) -> bool {
         self.faults.iter().all(|fault| matches!(fault.what, CableFault::Cut | CableFault::Held))
     }
 
-    /// Whether the device has had no fault at all.
+    /// Whether the plan has no fault for this device.
     pub fn is_untouched(&self) -> bool {
         self.faults.is_empty()
     }
@@ -72,8 +73,8 @@ impl Device {
         self.was_broken
     }
 
-    /// Handles the machine's bytes, measures, sends, and delivers parts that are due. A `quiet` device sends nothing
-    /// new.
+    /// Handles the machine's bytes, measures, sends, and delivers the parts that are due. A `quiet` device sends
+    /// nothing new.
     pub fn step(&mut self, now: MonoNs, quiet: bool) {
         self.connection(now);
         let mut out = Vec::new();
@@ -134,7 +135,7 @@ impl Device {
             self.put(now, frame.clone());
         }
         if self.has(CableFault::Disordered, now) && self.random.one_in(4) {
-            // Messages sent in the meantime overtake this one.
+            // Messages that are sent later may overtake this one.
             let late = now + DurNs(self.random.below(LONGEST_DELAY_NS) as i64);
             let place = self.under_way.partition_point(|(at, _)| *at <= late);
             return self.under_way.insert(place, (late, frame));
@@ -171,14 +172,15 @@ impl Device {
         }
     }
 
-    /// Queues a part behind all parts under way, because cables keep the order.
+    /// Queues a part after all earlier ones, because cables keep the order.
     fn put(&mut self, at: MonoNs, bytes: Vec<u8>) {
         let at = self.under_way.back().map_or(at, |(last, _)| at.max(*last));
         self.under_way.push_back((at, bytes));
     }
 }
 
-/// Lets a device receive and measure, in a vehicle that moves along the middle of a pipe of 3 m radius at 0.2 m/s.
+/// Passes received bytes to a device and lets it measure. The vehicle moves at 0.2 m/s along the axis of a pipe with
+/// a radius of 3 m.
 fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
     match device {
         Emulated::Head(device) | Emulated::Echosounder(device) => {

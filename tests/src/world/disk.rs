@@ -1,4 +1,4 @@
-//! A disk in memory that fails as planned, and its content after a kill or a power cut.
+//! A disk in memory that fails as planned, and the content that is left after a kill or a power cut.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::random::Random;
 
 /// Smallest unit that a power cut leaves intact, bytes.
 const SECTOR_BYTES: usize = 512;
-/// Linux error numbers: input or output error, no space left on device.
+/// Linux error numbers EIO (input or output error) and ENOSPC (no space left on device).
 const EIO: i32 = 5;
 const ENOSPC: i32 = 28;
 
@@ -22,28 +22,28 @@ enum Done {
     Created(PathBuf),
     Wrote(PathBuf, Vec<u8>),
     Synced(PathBuf),
-    /// A sync has failed: unsynced data reads as zeros.
+    /// A failed sync, after which unsynced data reads as zeros.
     Lost(PathBuf),
     Removed(PathBuf),
 }
 
-/// A simulated disk. Clones share its content.
+/// A simulated disk. All clones share one content.
 #[derive(Clone)]
 pub struct SimulatedDisk {
     clock: Arc<Clock>,
     faults: Arc<[Window<DiskFault>]>,
     done: Arc<SegQueue<Done>>,
-    /// Operations that failed.
+    /// Number of operations that failed.
     failed: Arc<SegQueue<DiskFault>>,
     sabotage: Option<Sabotage>,
 }
 
-/// A file left on the disk.
+/// A file that is left on the disk.
 #[derive(Debug, Clone, Default)]
 pub struct LeftFile {
-    /// Its name.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Its content.
+    /// Content of the file.
     pub bytes: Vec<u8>,
     /// Number of bytes that a power cut can't damage.
     synced: usize,
@@ -56,12 +56,12 @@ impl SimulatedDisk {
         Self { clock, faults: faults.into(), done, failed, sabotage }
     }
 
-    /// Number of operations that failed so far.
+    /// Number of operations that have failed so far.
     pub fn failures(&self) -> usize {
         self.failed.len()
     }
 
-    /// Content of the disk. After a power cut, unsynced data is cut off or has holes.
+    /// Returns the files that are left on the disk. After a power cut, unsynced data is cut off or has holes.
     pub fn left(&self, power_cut: Option<&mut Random>) -> Vec<LeftFile> {
         let mut files: Vec<LeftFile> = Vec::new();
         while let Some(done) = self.done.pop() {
@@ -104,7 +104,7 @@ fn of<'a>(files: &'a mut [LeftFile], path: &Path) -> &'a mut LeftFile {
     files.iter_mut().find(|file| file.path == path).unwrap()
 }
 
-/// Keeps or drops each unsynced sector at random. The length becomes anything from the synced length on.
+/// Keeps or drops each unsynced sector at random. The new length is at least the synced length.
 fn tear(file: &mut LeftFile, random: &mut Random) {
     let unsynced = file.bytes.len() - file.synced;
     file.bytes.truncate(file.synced + random.below(unsynced + 1));

@@ -1,13 +1,13 @@
-//! Invariants of every dive in a simulated world, whatever fails.
+//! Invariants of every dive in a simulated world, whichever faults occur.
 
 use super::plan::{Ending, MachineFault};
 use super::{DiveResult, Line, Replayed};
 use crate::drops;
 
-/// Longest time for which a running loop may leave packets waiting, recorded or not.
+/// Longest time for which packets may wait while the loop runs, with or without a recording.
 const LONGEST_WAIT_NS: i64 = 500_000_000;
 
-/// Broken invariants, as text.
+/// Lists the broken invariants as text.
 pub fn broken(lived: &DiveResult, replayed: &Result<Replayed, String>) -> Vec<String> {
     let mut broken: Vec<String> =
         lived.lines.iter().enumerate().filter_map(|(number, line)| of_line(lived, number, line)).collect();
@@ -21,30 +21,33 @@ pub fn broken(lived: &DiveResult, replayed: &Result<Replayed, String>) -> Vec<St
     broken
 }
 
-/// No fault affects another device, no delay loses a frame, and every device runs again after all faults.
+/// Checks one device: other devices' faults don't affect it, delays lose no frame, and it runs again after all
+/// faults.
 fn of_line(lived: &DiveResult, number: usize, line: &Line) -> Option<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let is_of = |fault: MachineFault| matches!(fault, MachineFault::LoopStalls | MachineFault::PortsStall);
     let stalled = lived.plan.machine.iter().any(|window| is_of(window.what));
     let Line { untouched, lossless, whole, good, history } = line;
     let what = if *untouched && (history.opened, history.lost) != (1, 0) {
-        "nothing happened to it, and its line was lost"
+        "it had no fault, but its line was lost"
     } else if *good > *whole && *lossless {
         "more frames were found than sent"
     } else if *lossless && finished && *good < *whole && history.dropped == 0 {
         "frames are missing, and none was counted"
     } else if history.dropped > 0 && !stalled && *untouched {
-        "packets were dropped although nothing held them up"
+        "packets were dropped although nothing stalled"
     } else if finished && !history.last.starts_with("running") {
-        "it doesn't run again"
+        "it isn't running at the end"
     } else {
         return None;
     };
     Some(format!("device {number}: {what}: {line:?}"))
 }
 
-/// Checks a log against the dive. It contains every packet that the loop took, in that order. Recorder and reader
-/// report every missing packet, and no other. Drops on a line before the loop are recorded.
+/// Checks a log against the dive.
+///
+/// The log contains every packet that the loop took, in the loop's order. Recorder and reader report exactly the
+/// missing packets. The log also states the packets that a line dropped before the loop.
 fn of_log(lived: &DiveResult, replayed: &Replayed) -> Vec<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let (ours, theirs) = (&lived.consumed, &replayed.consumed);
@@ -59,19 +62,19 @@ fn of_log(lived: &DiveResult, replayed: &Replayed) -> Vec<String> {
             broken.push(format!("{what}: {missing} of {} packets missing, reported: {losses:?}", ours.len()));
         }
     };
-    hold(invented == 0, "the log has what the loop never took, or in another order");
-    hold(missing == 0 || !losses.is_empty(), "packets are missing without a word");
+    hold(invented == 0, "the log has packets that the loop never took, or in another order");
+    hold(missing == 0 || !losses.is_empty(), "packets are missing and no loss is reported");
     hold(theirs.len() >= lived.certain, "packets are missing that had been synced");
     if finished {
         let summary = lived.summary.as_ref().unwrap();
         let told = summary.faults.iter().any(|fault| fault.lost > 0);
         let skipped = usize::try_from(summary.skipped).unwrap();
-        hold(told || missing == skipped, "packets are missing of which the recorder says nothing");
+        hold(told || missing == skipped, "packets are missing that the recorder doesn't report");
         hold(missing > 0 || replayed.digest == lived.digest, "the replay's results differ");
         let lines_dropped: u64 = lived.lines.iter().map(|line| line.history.dropped).sum();
-        hold(dropped == lines_dropped, "the log doesn't say what the lines dropped");
+        hold(dropped == lines_dropped, "the log doesn't state the packets that the lines dropped");
         let untroubled = lived.disk_failures == 0 && skipped == 0;
-        hold(!untroubled || summary.faults.is_empty(), "the recorder reports a fault that wasn't");
+        hold(!untroubled || summary.faults.is_empty(), "the recorder reports a fault that didn't occur");
         hold(!untroubled || losses.is_empty(), "losses are reported although the disk had no fault");
     }
     broken

@@ -1,7 +1,8 @@
 //! A simulated world for fault tests. Real drivers, line services, loop and recorder run on simulated devices,
 //! cables, disk and clock.
 //!
-//! One seed determines every failure. There are no threads, no ports and no real time, so a failing seed fails again.
+//! One seed determines every failure. There are no threads, no ports and no real time, so a seed that fails once
+//! fails every time.
 
 pub mod cable;
 pub mod device;
@@ -47,11 +48,11 @@ pub use sabotage::Sabotage;
 
 /// Longest step of the world, ns.
 const LONGEST_STEP_NS: usize = 12_000_000;
-/// Longest wait of a finished dive for data under way.
+/// Longest wait for data under way at the end of a dive.
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
-/// Capacity of the queue to the terminal; small, so that it fills soon.
+/// Capacity of the queue to the terminal. It is small, so that the queue becomes full soon.
 const NOTICES: usize = 4;
-/// Age at which recorded packets are certainly synced: half a second plus one step of the world.
+/// Age from which recorded packets are always synced: half a second plus one step of the world.
 const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
 
 const TUNNEL: &str = r#"name = "a world of faults"
@@ -79,7 +80,7 @@ const SENSORS: [&str; 6] = [
     "plugin = \"tether_hid\"\nconnect = \"udp:10.0.0.2:9002\"\ncounts_per_metre = 2000\n",
 ];
 
-/// Size of the recorder's queue, bytes; so small that a stall of seconds fills it.
+/// Size of the recorder's queue, bytes. It is so small that a stall of some seconds fills the queue.
 const QUEUE_BYTES: usize = 128 * 1024;
 
 /// The vehicle file of all worlds.
@@ -91,10 +92,10 @@ pub fn vehicle_text() -> String {
     text
 }
 
-/// A packet as the loop took it.
+/// A packet that the loop has taken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Consumed {
-    /// Its source.
+    /// Source of the packet.
     pub source: u16,
     /// Receive time.
     pub received: MonoNs,
@@ -115,16 +116,17 @@ pub struct World {
     consumed: Vec<Consumed>,
     disk: SimulatedDisk,
     recorder: RecorderWorker,
-    /// Number of packets consumed each time the recorder emptied its queue, with the time, since its last trouble.
+    /// Time and number of consumed packets at each moment when the recorder's queue was empty, since the last disk
+    /// failure.
     taken: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
-    /// Number of packets that the recorder skipped because it was too far behind.
+    /// Number of packets that the recorder skipped because its backlog was too large.
     skipped: usize,
-    /// Time since which packets wait while the loop takes none, and the longest such wait while the loop ran.
+    /// Time since which packets have waited for the loop. `longest_wait` is the longest such wait of a running loop.
     waiting_since: Option<MonoNs>,
     longest_wait: DurNs,
     notices: NoticeReceiver,
-    /// Number of packets that must be in the log, however the dive ends.
+    /// Number of packets that must be in the log, whichever way the dive ends.
     certain: usize,
 }
 
@@ -132,40 +134,40 @@ pub struct World {
 pub struct DiveResult {
     /// Planned faults.
     pub plan: Plan,
-    /// Packets taken by the loop, in order.
+    /// Packets that the loop took, in order.
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// Lines, one for each device.
+    /// Results of the lines, one for each device.
     pub lines: Vec<Line>,
     /// Summary of the recorder; `None` if it was killed.
     pub summary: Option<Summary>,
-    /// Number of disk operations that failed.
+    /// Number of failed disk operations.
     pub disk_failures: usize,
     /// Files of the recording.
     pub left: Vec<LeftFile>,
-    /// Number of consumed packets that must be in the log, however the dive ends.
+    /// Number of consumed packets that must be in the log, whichever way the dive ends.
     pub certain: usize,
-    /// Longest time for which a running loop took nothing although packets waited.
+    /// Longest time for which packets waited although the loop ran.
     pub longest_wait: DurNs,
 }
 
-/// Result of replaying the files that are left.
+/// Result of a replay of the remaining files.
 pub struct Replayed {
-    /// Packets taken by the loop.
+    /// Packets that the loop took.
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// Losses reported by the player.
+    /// Losses that the player reported.
     pub losses: Vec<String>,
 }
 
 /// Result of a device's line.
 #[derive(Debug)]
 pub struct Line {
-    /// No fault affected it.
+    /// Whether the plan has no fault for the device.
     pub untouched: bool,
-    /// Its cable only split and delayed frames.
+    /// Whether the cable only splits and delays frames.
     pub lossless: bool,
     /// Number of frames sent whole.
     pub whole: u64,
@@ -176,12 +178,12 @@ pub struct Line {
 }
 
 impl World {
-    /// Creates the world of a seed, before the dive.
+    /// Creates the world of a seed; the dive hasn't begun.
     pub fn new(seed: u64) -> Self {
         Self::sabotaged(seed, None)
     }
 
-    /// As [`World::new`], with a sabotage that breaks an invariant.
+    /// As [`World::new`]; the sabotage breaks an invariant.
     pub fn sabotaged(seed: u64, sabotage: Option<Sabotage>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
@@ -246,7 +248,7 @@ impl World {
         }
     }
 
-    /// The same world with a terminal that accepts everything, or nothing.
+    /// The same world with a terminal that accepts everything or nothing.
     #[must_use]
     pub fn with_terminal(mut self, stands: bool) -> Self {
         self.plan = self.plan.with_terminal(stands);
@@ -309,8 +311,8 @@ impl World {
         Duration::from_nanos(u64::try_from(self.clock.now().since(BEGIN).0).unwrap())
     }
 
-    /// Lets the recorder write. Packets that it took more than half a second and a step ago are certain, unless its
-    /// disk failed.
+    /// Lets the recorder write. Without a disk failure, packets count as certain half a second and one step after the recorder
+    /// took them.
     fn record(&mut self, now: MonoNs) {
         let since_begin = self.since_begin();
         let failures = self.disk.failures();
@@ -373,7 +375,7 @@ impl World {
 }
 
 impl DiveResult {
-    /// Replays the files that are left, from `folder`; `None` without files.
+    /// Writes the remaining files to `folder` and replays them; `None` without files.
     ///
     /// Errors: the reason why the files can't be read as a log.
     pub fn replay(&self, folder: &Folder) -> Result<Replayed, String> {
@@ -416,7 +418,7 @@ fn app(vehicle: &VehicleConfig) -> App {
     app
 }
 
-/// Creates the loop of a recorded dive and its recorder.
+/// Creates the loop and the recorder of a dive.
 fn assemble(
     vehicle: &VehicleConfig,
     text: &str,
@@ -444,9 +446,9 @@ fn assemble(
     (app.arm(vehicle.navigation()).unwrap(), worker, notices)
 }
 
-/// Does the work of a line service's thread until it would wait.
+/// Does the work of a line service's thread up to the point where the thread would wait.
 fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
-    // Each step reads once. The limit catches a driver that is always due, which would block the thread, too.
+    // Each step reads once. The limit detects a driver that is always due; a real thread would never wait.
     for _ in 0..10_000 {
         let due = match service.closed_until() {
             Some(until) => until <= now,

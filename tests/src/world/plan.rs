@@ -6,15 +6,15 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 use crate::random::Random;
 
-/// Start of a dive, some time after the machine was switched on.
+/// Time at which dives start; the machine was switched on some time before.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
-/// Time within which faults begin, ns.
+/// Period in which faults begin, ns.
 const BEGIN_WITHIN_NS: usize = 6_000_000_000;
 const END_WITHIN_NS: usize = 7_000_000_000;
-/// Length of a dive, including time to recover after the last fault.
+/// Length of a dive. It includes time to recover after the last fault.
 const LENGTH: DurNs = DurNs(12_000_000_000);
-/// Longest fault, ns. It is shorter than any silence timeout for a cable that only delays, and long enough to fill
-/// the queues for a loop or recorder.
+/// Longest fault, ns. A delay on a cable is shorter than any silence timeout. A stall of the loop or recorder is long
+/// enough to fill the queues.
 const LONGEST_HOLD_NS: usize = 1_500_000_000;
 const LONGEST_STALL_NS: usize = 7_000_000_000;
 const LONGEST_NS: usize = 3_000_000_000;
@@ -24,9 +24,9 @@ const LONGEST_NS: usize = 3_000_000_000;
 pub struct Window<T> {
     /// The fault.
     pub what: T,
-    /// Begin, inclusive.
+    /// Start of the fault, inclusive.
     pub from: MonoNs,
-    /// End, exclusive.
+    /// End of the fault, exclusive.
     pub to: MonoNs,
 }
 
@@ -40,9 +40,9 @@ impl<T> Window<T> {
 /// Faults of a cable or of the device at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CableFault {
-    /// A stream arrives in pieces of any length, up to 80 ms apart.
+    /// The byte stream arrives in pieces of any length, up to 80 ms apart.
     Cut,
-    /// Nothing arrives, and then everything at once.
+    /// Nothing arrives at first, and then everything at once.
     Held,
     /// Bytes or messages are lost.
     Lost,
@@ -127,7 +127,7 @@ const OF_DISKS: [DiskFault; 5] = [
     DiskFault::CreateFails,
 ];
 
-/// How a dive ends.
+/// End of a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Ending {
     /// Regular end.
@@ -154,7 +154,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Draws a plan. `streams` states which cables carry byte streams. At least one cable stays sound.
+    /// Draws a plan. `streams` says for each cable whether it carries a byte stream. At least one cable has no fault.
     pub fn draw(random: &mut Random, streams: &[bool]) -> Self {
         let mut cables = vec![Vec::new(); streams.len()];
         let sound = random.below(streams.len());
@@ -183,7 +183,7 @@ impl Plan {
         Self { cables, machine, disk, ending, end: BEGIN + LENGTH - DurNs(early as i64) }
     }
 
-    /// The same plan with a terminal that accepts everything, or nothing.
+    /// The same plan with a terminal that accepts everything or nothing.
     #[must_use]
     pub fn with_terminal(mut self, stands: bool) -> Self {
         self.machine.retain(|window| window.what != MachineFault::TerminalStands);

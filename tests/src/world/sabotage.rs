@@ -1,17 +1,17 @@
-//! Deliberate violations of an invariant, to test that they are found.
+//! Deliberate violations of invariants, which prove that the checks find violations.
 
 /// A deliberate violation of an invariant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sabotage {
-    /// Every hundredth frame of a sound device is lost on the way.
+    /// Every hundredth frame of a device without faults is lost on its way.
     CableLoses,
     /// When one connection breaks, another breaks too.
     NeighbourBreaks,
     /// Every fortieth write is dropped but reported as done.
     DiskForgets,
-    /// Syncs are reported as done but aren't done.
+    /// Syncs are reported as done although nothing is synced.
     SyncLies,
-    /// Drops on a line aren't recorded.
+    /// The log doesn't state the packets that a line dropped.
     DropsUntold,
 }
 

@@ -1,6 +1,6 @@
-//! Wrong input: every message names file, line, key, value and allowed values, with the right exit code.
+//! Wrong input is refused. Every message names file, line, key, value and allowed values, and the exit code is right.
 //!
-//! Exit codes are 0 ok, 1 failed, 2 usage, 3 finished but data was lost. The readable part of a damaged log is used,
+//! Exit codes are 0 ok, 1 failed, 2 usage, and 3 finished with data loss. The readable part of a damaged log is used,
 //! and losses are reported with their time span.
 
 use std::fmt::Write as _;
@@ -10,13 +10,13 @@ use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::{Compression, WriteOptions};
 use serde_json::Value;
 
-/// Replaces one piece of a text, which must occur exactly once.
+/// Replaces a piece of a text. The piece must occur exactly once.
 fn change(text: &str, from: &str, to: &str) -> String {
     assert_eq!(text.matches(from).count(), 1, "{from:?}");
     text.replace(from, to)
 }
 
-/// Output of the program for each wrong text. Every run must be a usage error with nothing on stdout.
+/// Output of the program for each wrong text. Every run must end with a usage error and write nothing to stdout.
 fn refusals(command: &[&str], file: &str, text: &str, cases: &[(&str, &str, &str)]) -> String {
     let folder = Folder::with_dive();
     let mut said = String::new();
@@ -187,7 +187,7 @@ fn wrong_polyline_is_refused_with_its_line_or_vertex() {
     refuse("no number", Some("y_m,z_m\n-2,0\n2,zero\n2,4\n-2,4\n"));
     refuse("one number", Some("y_m,z_m\n-2,0\n2\n2,4\n-2,4\n"));
     refuse("not finite", Some("-2,0\n2,0\n2,inf\n-2,4\n"));
-    // A side chamber behind a corner, which can't be seen from the centre.
+    // A side chamber around a corner, which can't be seen from the centre.
     refuse("not star-shaped", Some("-2,0\n2,0\n2,1\n5,1\n5,6\n4.5,6\n4.5,2\n2,2\n2,4\n-2,4\n"));
     refuse("crosses itself", Some("-2,0\n2,4\n2,0\n-2,4\n"));
     insta::assert_snapshot!(said, @r#"
@@ -265,7 +265,7 @@ fn seconds(loss: &str, word: &str) -> f64 {
     rest.split_whitespace().next().unwrap().parse().unwrap()
 }
 
-/// Replaces every number with #, for texts whose words matter.
+/// Replaces every number with #, because only the words of the text matter.
 fn without_numbers(text: &str) -> String {
     let mut short = String::new();
     for c in text.chars().map(|c| if c.is_ascii_digit() { '#' } else { c }) {
@@ -300,7 +300,7 @@ fn truncated_log_is_used_up_to_the_cut_and_the_rest_reported_lost() {
             let last_s = messages[read - 1].log_time as f64 * 1e-9;
             assert!((seconds(losses[0], "after") - last_s).abs() < 1e-3, "{losses:?}, last {last_s}");
 
-            // The part that was read counts as a complete dive.
+            // The readable part gives the same results as a complete log with these messages.
             write_log(&folder.path("short.mcap"), WriteOptions::new(), Some(VEHICLE), &messages[..read]);
             let (_, short) = folder.replay("short.mcap", &[]);
             assert_eq!(report["digest"], short["digest"], "{log} {tenths}");
@@ -337,7 +337,7 @@ fn corrupt_log_loses_only_the_broken_chunk() {
         assert_eq!(code, Some(3));
         let read = usize::try_from(report["log"]["messages"].as_u64().unwrap()).unwrap();
         assert!(read < count && read > count * 8 / 10, "{read} of {count}");
-        // The loss spans from the last message before the chunk to the first one after it.
+        // The loss extends from the last message before the broken chunk to the first message after it.
         let [loss] = losses(&report)[..] else { panic!("{:?}", losses(&report)) };
         let close = |word, at_ns: u64| (seconds(loss, word) - at_ns as f64 * 1e-9).abs() < 0.02;
         assert_eq!(chunk.message_start_time > first_ns, loss.contains("after"), "{loss}");
@@ -464,7 +464,7 @@ fn every_command_has_help_with_an_example() {
     assert!(commands.contains(&"replay") && commands.contains(&"demo"), "{commands:?}");
     for command in commands.into_iter().filter(|command| *command != "help") {
         let answer = folder.headrace(&[command, "--help"]);
-        // Another program provides it. If that is missing, the message says how to build it.
+        // These commands run another program. If that program is missing, the message says how to build it.
         if ["campaign", "batch", "cost"].contains(&command) && answer.code == Some(2) {
             assert!(
                 answer.stderr.contains("cargo build --release --manifest-path lab/Cargo.toml -p headrace_c"),

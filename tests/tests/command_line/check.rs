@@ -1,5 +1,5 @@
-//! `headrace check`: all errors of a file at once, conflicts of lines, walls out of range, and the figures of the
-//! plan.
+//! `headrace check` lists all errors of a file at once, conflicts of lines, walls out of range, and the figures of
+//! the plan.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use headrace_geometry::math;
 use headrace_tests::{Folder, SCENE, VEHICLE, root};
 use serde_json::Value;
 
-/// Replaces several pieces of a text, each of which must occur exactly once.
+/// Replaces several pieces of a text. Each piece must occur exactly once.
 fn changed(text: &str, changes: &[(&str, &str)]) -> String {
     changes.iter().fold(text.to_owned(), |text, (from, to)| {
         assert_eq!(text.matches(from).count(), 1, "{from:?}");
@@ -85,14 +85,14 @@ fn all_errors_of_a_scene_and_its_vehicle_file_are_listed_at_once() {
     assert!(!folder.path("dive.mcap").exists());
 }
 
-/// Output of `check` for each changed vehicle file, with its exit code.
+/// Output and exit code of `check` for each changed vehicle file.
 fn findings(cases: &[(&str, &[(&str, &str)])]) -> String {
     let folder = Folder::new();
     let mut said = String::new();
     for (what, changes) in cases {
         folder.write("vehicle.toml", changed(VEHICLE, changes));
         let answer = folder.headrace(&["check", "vehicle.toml"]);
-        // Errors suppress the summary; warnings alone keep it.
+        // Errors suppress the summary; warnings don't.
         assert_eq!(answer.stdout.is_empty(), answer.code == Some(2), "{what}");
         write!(said, "{what}: {}\n{}", answer.code.unwrap(), answer.stderr).unwrap();
     }
@@ -156,7 +156,7 @@ fn lines_that_two_sensors_cannot_share_are_errors() {
     "#);
 }
 
-/// The dive goes on with the wrong file, since it may be the only one.
+/// The dive goes on in spite of errors in the vehicle file, because no other file may be at hand.
 #[test]
 fn run_warns_of_errors_found_by_check() {
     let folder = Folder::new();
@@ -340,9 +340,10 @@ fn too_many_sensors_give_the_same_error_in_check_and_run() {
     assert!(answer.stderr.contains("many.toml:284: sensors[64].id: 65 sensors"), "{}", answer.stderr);
 }
 
-/// The vehicle file's speed limits apply to heads started for its planned speed; `run` gives the same advice.
+/// The limit applies to heads that start in phase for the planned speed of the vehicle file. `run` gives the same
+/// advice.
 #[test]
-fn limits_at_the_planned_speed_are_listed_beside_the_plan_limits() {
+fn check_lists_the_speed_limit_of_heads_started_for_the_planned_speed() {
     let folder = Folder::new();
     let vita = std::fs::read_to_string(root().join("deploy/vehicles/vita2-4.toml")).unwrap();
     let planned = |mps: &str| {

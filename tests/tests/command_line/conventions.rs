@@ -29,7 +29,7 @@ fn completions_know_all_commands_and_are_valid_scripts() {
         assert!(answer.stdout.contains("sound-speed"), "{shell}: options of commands");
     }
     let script = folder.headrace(&["completions", "bash"]).stdout;
-    // Completes as readline would.
+    // Completes a word as readline does.
     let asked = "\nCOMP_WORDS=(headrace rep); COMP_CWORD=1; _headrace headrace rep headrace; echo \"${COMPREPLY[*]}\"\n";
     let bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
     let Ok(mut bash) = bash else { return skipped("no bash") };
@@ -50,7 +50,7 @@ fn every_command_has_a_manual_page() {
         let page = String::from_utf8(folder.read(&format!("pages/headrace-{command}.1"))).unwrap();
         assert!(page.contains(".SH SYNOPSIS") && page.contains(&command), "{page}");
     }
-    // A second run works, but doesn't overwrite a foreign page.
+    // A second run succeeds. A page that another program wrote is only overwritten with `--force`.
     assert_eq!(folder.headrace(&["man", "pages"]).code, Some(0));
     folder.write("pages/headrace.1", ".TH headrace 1\n");
     assert_eq!(folder.headrace(&["man", "pages"]).code, Some(2));
@@ -60,7 +60,7 @@ fn every_command_has_a_manual_page() {
 #[test]
 fn colours_appear_only_on_terminals_that_support_them() {
     let folder = Folder::with_dive();
-    // Help, an error of the command line, log messages, and a dive with flags.
+    // These arguments give help, a usage error, a dive with flags, and log messages.
     let outputs: [&[&str]; 4] = [
         &["replay", "--help"],
         &["replay", "--bad"],
@@ -69,10 +69,10 @@ fn colours_appear_only_on_terminals_that_support_them() {
     ];
     for arguments in outputs {
         let shown = |variables: &[(&str, &str)]| Screen::run(&folder, arguments, 100, variables).end().1;
-        assert!(shown(&[]).contains("\x1b["), "{arguments:?}: a terminal has colours");
+        assert!(shown(&[]).contains("\x1b["), "{arguments:?}: no colours on a terminal");
         assert!(shown(&[("NO_COLOR", "")]).contains("\x1b["), "{arguments:?}: empty is unset");
         let plain = shown(&[("NO_COLOR", "1")]);
-        // Only the sequence that overwrites the present line may remain.
+        // Without colours, only the sequence that overwrites the present line is allowed.
         assert!(!plain.replace("\r\x1b[K", "").contains('\x1b'), "{arguments:?}: {plain:?}");
         let dumb = shown(&[("TERM", "dumb")]);
         assert!(!dumb.contains('\x1b'), "{arguments:?}: {dumb:?}");
@@ -81,7 +81,7 @@ fn colours_appear_only_on_terminals_that_support_them() {
 }
 
 #[test]
-fn quiet_leaves_results_and_errors() {
+fn quiet_option_keeps_results_and_errors() {
     let folder = Folder::with_dive();
     let loud = folder.headrace(&["replay", "dive.mcap", "--target", "0.3"]);
     let quiet = folder.headrace(&["replay", "dive.mcap", "--target", "0.3", "-q"]);
@@ -94,7 +94,7 @@ fn quiet_leaves_results_and_errors() {
 }
 
 #[test]
-fn work_over_2_s_shows_the_remaining_time() {
+fn commands_over_2_s_show_the_remaining_time() {
     let folder = Folder::new();
     let scene = root().join("deploy/scenes/seven-kilometres.toml");
     let simulate = ["simulate", scene.to_str().unwrap(), "-o", "long.mcap"];
@@ -108,7 +108,7 @@ fn work_over_2_s_shows_the_remaining_time() {
     quiet.end();
 }
 
-/// Another process that shares stdout may make it non-blocking.
+/// Another process that shares stdout may have made stdout non-blocking.
 #[cfg(target_os = "linux")]
 #[test]
 fn report_is_complete_on_a_non_blocking_pipe() {
@@ -116,12 +116,12 @@ fn report_is_complete_on_a_non_blocking_pipe() {
     let folder = Folder::with_dive();
     let (mut reader, mut writer) = std::io::pipe().unwrap();
     fcntl_setfl(&writer, OFlags::NONBLOCK).unwrap();
-    // Fill the pipe, which holds 64 KiB; JSON allows leading spaces.
+    // Nearly fills the pipe, which holds 64 KiB. JSON allows leading spaces.
     writer.write_all(&vec![b' '; 60_000]).unwrap();
     let mut command = program();
     command.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path("")).stdout(writer);
     let mut replay = command.spawn().unwrap();
-    // The command holds a copy of the pipe's end.
+    // The command still holds a copy of the pipe's end.
     drop(command);
     std::thread::sleep(std::time::Duration::from_secs(2));
     let mut bytes = Vec::new();
@@ -196,10 +196,10 @@ fn unwritable_output_is_a_failure() {
         assert_eq!(failed, Some(1), "{arguments:?}: {said}");
         assert!(said.contains("standard output: No space left on device"), "{arguments:?}: {said}");
     }
-    // A full disk behind the terminal doesn't fail a dive.
+    // A full disk behind stdout doesn't fail a dive.
     let dive = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max"];
     assert_eq!(code(&dive, full()).0, Some(0));
-    // A reader that closes the pipe wants no more output.
+    // Closing the reading end is no error: the reader wants no more output.
     for arguments in [&["replay", "live.mcap"][..], &["replay", "live.mcap", "--json"], &["help"], &dive] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);

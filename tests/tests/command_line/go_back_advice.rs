@@ -1,10 +1,10 @@
-//! Advice to a pilot who goes back for a missed stretch: no repeated statements, no needless speed limit, and one
-//! clear end.
+//! Advice to a pilot who goes back for a missed stretch. Statements aren't repeated, no needless speed limit appears,
+//! and the end of the stretch is clear.
 
 use headrace_tests::{Folder, root};
 use serde_json::Value;
 
-/// Output lines of a dive of the shipped vehicle in this scene.
+/// Output lines of a dive of the shipped vehicle along this scene's path.
 fn told(scene: &str) -> Vec<Value> {
     let folder = Folder::new();
     let file = root().join("deploy/vehicles/vita2-4.toml");
@@ -25,7 +25,7 @@ fn figure(line: &Value, key: &str) -> f64 {
     line[key].as_f64().unwrap_or_else(|| panic!("{key} of {line}"))
 }
 
-/// Conditions, without the seconds after each turn.
+/// Displayed conditions between two chainages in one direction, without the seconds after the vehicle turns.
 fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
     let states = of(lines, "state");
     let within = |state: &&&Value| {
@@ -37,7 +37,7 @@ fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
 }
 
 #[test]
-fn demonstration_stretch_is_announced_once_and_cleared_once() {
+fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
     let lines = told(&std::fs::read_to_string(root().join("deploy/scenes/demo.toml")).unwrap());
     let (flags, ends, cleared) = (of(&lines, "flag"), of(&lines, "flag_ends"), of(&lines, "cleared"));
     assert_eq!([flags.len(), ends.len(), cleared.len()], [1, 1, 1], "{flags:?} {ends:?} {cleared:?}");
@@ -47,7 +47,8 @@ fn demonstration_stretch_is_announced_once_and_cleared_once() {
     assert_eq!(cleared[0]["from_m"], flags[0]["from_m"]);
     let [from_m, to_m] = ["from_m", "to_m"].map(|key| figure(cleared[0], key));
     assert!(to_m - from_m > 4.0, "{from_m} to {to_m}");
-    // The way back adds samples, and sections that stay undecided until they are passed again.
+    // On the way back, new samples leave some sections undecided. They are decided when the vehicle passes them
+    // again.
     let unsure = of(&lines, "cannot_say");
     let within = unsure.iter().filter(|line| (from_m..to_m).contains(&figure(line, "from_m")));
     assert_eq!(within.count(), 0, "{unsure:?}");
@@ -58,7 +59,7 @@ fn demonstration_stretch_is_announced_once_and_cleared_once() {
     assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
 }
 
-/// A dive with this speed on the way out, and a fast way back.
+/// A dive with this speed on the way out and a high speed on the way back.
 fn there_and_back(there_mps: f64) -> Vec<Value> {
     told(&format!(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
@@ -79,9 +80,9 @@ fn no_speed_is_too_fast_over_passed_wall_or_on_the_way_back() {
     assert!(back.len() > 5 && back.iter().all(|condition| *condition == "going_back"), "{back:?}");
 }
 
-/// A pilot must slow down before new wall, so the limit returns in time.
+/// The limit returns early enough for the pilot to slow down before new wall.
 #[test]
-fn speed_limit_returns_before_new_wall() {
+fn speed_limit_returns_before_the_heads_reach_new_wall() {
     let lines = told(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
          [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 12\nspeed_mps = 0.09\n\
@@ -93,13 +94,14 @@ fn speed_limit_returns_before_new_wall() {
         .filter(|state| state["speed_mps"].as_f64().is_some_and(|mps| mps > 0.25))
         .collect();
     let first = again.iter().find(|state| state["condition"] == "too_fast").unwrap();
-    // The heads are 0.55 m before the vehicle's origin, and have seen wall up to there.
+    // The front heads are 0.55 m before the vehicle's origin and have seen the wall up to that distance.
     let x_m = figure(&first["position"], "chainage_m");
     assert!((9.0..11.5).contains(&x_m), "{x_m}");
     assert!(again.iter().any(|state| state["condition"] == "passed"));
 }
 
-/// A dive that is too fast over 6 m and returns to a chainage; it goes on at a speed or ends there.
+/// A dive that is too fast over 6 m, goes back to the chainage `to_m`, and ends there or continues at the speed
+/// `on_mps`.
 fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
     let on = on_mps.map_or_else(String::new, |mps| {
         format!("[[trajectory.waypoints]]\nchainage_m = 20\nspeed_mps = {mps}\n")
@@ -112,7 +114,7 @@ fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
     )
 }
 
-/// The displayed position is the vehicle's origin; its heads are before and behind it.
+/// The displayed position is that of the vehicle's origin, which has heads before and behind it.
 #[test]
 fn following_the_go_back_advice_clears_every_missed_section() {
     let end = |lines: &[Value]| of(lines, "end")[0]["summary"]["fail_m"].as_f64().unwrap();
@@ -130,7 +132,7 @@ fn following_the_go_back_advice_clears_every_missed_section() {
     assert!(left_m < 0.1, "{left_m} m, {text}");
 }
 
-/// A dive that ends on the way back still counts its missed sections in the totals.
+/// The totals include missed sections even if the dive ends on the way back.
 #[test]
 fn dive_that_ends_on_the_way_back_reports_its_missed_sections() {
     let lines = told(&missed_and_back(10.5, None));

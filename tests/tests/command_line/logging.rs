@@ -1,4 +1,4 @@
-//! Log messages go to stderr, by level and crate, and never mix with results.
+//! Log messages go to stderr, are filtered by level and crate, and never mix with results.
 
 use headrace_tests::{Answer, Folder, VEHICLE};
 use serde_json::Value;
@@ -13,7 +13,7 @@ fn headrace(folder: &Folder, rust_log: Option<&str>, arguments: &[&str]) -> Answ
     Answer { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 
-/// Probes an address where nothing listens. It causes events of this crate (vehicle file) and of `headrace_ports`
+/// Probes an address without a listener. The probe logs events of this crate (vehicle file) and of `headrace_ports`
 /// (probe).
 fn probe(folder: &Folder, rust_log: Option<&str>, flags: &[&str]) -> Answer {
     let devices = ["devices", "--vehicle", "vehicle.toml", "--address", "tcp:127.0.0.1:1", "--json"];
@@ -39,7 +39,7 @@ fn verbose_shows_events_of_every_crate_and_the_default_shows_none() {
 }
 
 #[test]
-fn log_variable_shows_only_the_named_crate() {
+fn rust_log_variable_shows_only_the_named_crate() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     let ports = probe(&folder, Some("headrace_ports=debug"), &[]);
@@ -51,7 +51,7 @@ fn log_variable_shows_only_the_named_crate() {
 }
 
 #[test]
-fn invalid_log_variable_is_a_warning_hidden_by_quiet() {
+fn invalid_rust_log_variable_is_a_warning_hidden_by_quiet() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     let warned = probe(&folder, Some("headrace=loud"), &[]);
@@ -61,7 +61,7 @@ fn invalid_log_variable_is_a_warning_hidden_by_quiet() {
 }
 
 #[test]
-fn replay_logs_files_memory_and_phases_with_unchanged_report() {
+fn verbose_replay_logs_its_phases_and_leaves_the_report_unchanged() {
     let folder = Folder::with_dive();
     let silent = headrace(&folder, None, &["replay", "dive.mcap", "--json"]);
     assert_eq!(silent.stderr, "");
@@ -81,7 +81,7 @@ fn replay_logs_files_memory_and_phases_with_unchanged_report() {
 }
 
 #[test]
-fn recording_logs_its_file_and_a_damaged_log_its_damage() {
+fn verbose_run_logs_its_recording_and_verbose_replay_logs_damage() {
     let folder = Folder::with_dive();
     let run =
         ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "-v", "--record", "again.mcap"];

@@ -1,4 +1,4 @@
-//! Tests of the command line: answers, refusals, screens, and the files that it writes.
+//! Tests of the command line: answers, refusals, screens, and written files.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 

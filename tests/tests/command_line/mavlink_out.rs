@@ -1,5 +1,5 @@
-//! Checks `--mavlink-out` as a ground station sees it. Bytes are decoded by the MAVLink guide's description, without
-//! headrace's decoder.
+//! Checks `--mavlink-out` from the view of a ground station. A decoder made from the MAVLink guide reads the bytes,
+//! independently of headrace's decoder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::UdpSocket;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use headrace_tests::{Folder, root};
 
-/// Names that QGroundControl interprets as the autopilot's.
+/// Names that QGroundControl takes for values of the autopilot.
 const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
@@ -27,13 +27,13 @@ struct Said {
     payload: Vec<u8>,
 }
 
-/// Decodes a datagram, which is one MAVLink 2 frame.
+/// Decodes a datagram, which contains one MAVLink 2 frame.
 fn said(datagram: &[u8]) -> Said {
     let length = usize::from(datagram[1]);
     assert_eq!((datagram[0], datagram[2], datagram.len()), (0xfd, 0, 12 + length), "{datagram:?}");
     assert_eq!(datagram[5..7], [7, 191], "system and component");
     let id = u32::from_le_bytes([datagram[7], datagram[8], datagram[9], 0]);
-    // Checks that only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT occur, by their CRC_EXTRA.
+    // CRC_EXTRA of a message. Only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT may occur.
     let extra =
         *BTreeMap::from([(0, 50), (251, 170), (253, 83)]).get(&id).unwrap_or_else(|| panic!("message {id}"));
     let summed = datagram[1..10 + length].iter().copied().chain([extra]);
@@ -48,7 +48,7 @@ fn text_of(bytes: &[u8]) -> String {
     String::from_utf8(bytes[..end].to_vec()).unwrap()
 }
 
-/// All messages of a replay, and its digest.
+/// All messages of a replay, and the digest of the replay.
 fn heard(log: &str) -> (Vec<Said>, String) {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
@@ -96,13 +96,14 @@ fn replay(log: &str, to: &str) -> String {
 fn ground_station_receives_heartbeats_values_and_each_alert_once() {
     let (all, digest) = heard("too-fast");
     let of = |id: u32| all.iter().filter(move |said| said.id == id);
-    // No frame is lost on the way: sequence numbers increase by one.
+    // Consecutive sequence numbers show that no frame is lost.
     let mut expected = 0_u8;
     for said in &all {
         assert_eq!(said.sequence, expected);
         expected = expected.wrapping_add(1);
     }
-    // The type is an onboard computer, not an autopilot; the dive lasts 81 s with one heartbeat each.
+    // The heartbeat's type is an onboard computer, not an autopilot. The dive lasts 81 s, with about one heartbeat
+    // per second.
     assert!(of(0).all(|said| said.payload[4..6] == [18, 8]));
     assert!((75..=90).contains(&of(0).count()), "{}", of(0).count());
     let name = |said: &Said| text_of(&said.payload[8..18]);
@@ -122,7 +123,7 @@ fn ground_station_receives_heartbeats_values_and_each_alert_once() {
     );
     assert!(limits.iter().any(|mps| (0.2..0.35).contains(mps)), "{limits:?}");
     assert!(values("HR_MISS_M").iter().any(|m| *m > 2.0));
-    // Joins text parts by their numbers.
+    // Texts in several parts are joined by their id.
     let mut texts: BTreeMap<(usize, u16), String> = BTreeMap::new();
     for (place, said) in of(253).enumerate() {
         let id = u16::from_le_bytes([said.payload[51], said.payload[52]]);

@@ -1,12 +1,11 @@
-//! Existing files are only overwritten with `--force`, and outputs are checked before the work begins.
+//! Existing files are only overwritten with `--force`. Outputs are checked before the work begins.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 
 use headrace_tests::{Folder, SCENE, VEHICLE, program, root, skipped};
 
-/// Checks that a command refuses to overwrite `there`, which stays unchanged, and overwrites it with `--force` if
-/// allowed.
+/// Checks that a command refuses to overwrite the file `there` and leaves it unchanged.
 #[track_caller]
 fn refuses(folder: &Folder, command: &[&str], there: &str) {
     let before = folder.read(there);
@@ -25,11 +24,12 @@ fn never(folder: &Folder, command: &[&str]) {
         let answer = folder.headrace(&command);
         assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{command:?}: {}", answer.stderr);
         assert!(answer.stderr.contains("it is read by this command"), "{command:?}: {}", answer.stderr);
-        assert!(content(folder) == before, "{command:?}: the folder's files are others now");
+        assert!(content(folder) == before, "{command:?}: the folder's files have changed");
     }
 }
 
-/// Checks that a command refuses to write two outputs to one file, and names both. The folder stays unchanged.
+/// Checks that a command refuses to write two outputs to one file. The message names both outputs, and the folder
+/// stays unchanged.
 #[track_caller]
 fn two_files(folder: &Folder, command: &[&str], named: &[&str]) {
     let before = content(folder);
@@ -39,7 +39,7 @@ fn two_files(folder: &Folder, command: &[&str], named: &[&str]) {
     for name in named {
         assert!(answer.stderr.contains(name), "{command:?}: no {name:?} in {}", answer.stderr);
     }
-    assert!(content(folder) == before, "{command:?}: the folder's files are others now");
+    assert!(content(folder) == before, "{command:?}: the folder's files have changed");
 }
 
 /// Names and content of the files in a folder.
@@ -95,7 +95,7 @@ fn report_overwrites_only_reports() {
     refuses(&folder, &["replay", "dive.mcap", "--expect", "other.json", "--bless"], "other.json");
     accepts(&folder, &[&to("other.json")[..], &["--force"]].concat(), "other.json");
     assert!(folder.read("other.json").starts_with(b"{\n  \"report_version\":"));
-    // Even `--force` doesn't allow it.
+    // Even with `--force`, a report can't replace a log.
     let before = folder.read("dive.mcap");
     let answer = folder.headrace(&[&to("dive.mcap")[..], &["--force"]].concat());
     assert_eq!(answer.code, Some(2), "{}", answer.stderr);
@@ -123,7 +123,7 @@ fn recordings_and_derived_logs_overwrite_no_other_log() {
     accepts(&folder, &[&trim[..], &["live_2.mcap", "--force"]].concat(), "live_2.mcap");
     accepts(&folder, &[&record[..], &["live_2.mcap", "--force"]].concat(), "live_2.mcap");
     let answer = folder.headrace(&[&recover[..], &["live.mcap", "--force"]].concat());
-    assert_eq!(answer.code, Some(2), "an input is no output: {}", answer.stderr);
+    assert_eq!(answer.code, Some(2), "an input was accepted as output: {}", answer.stderr);
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn outputs_are_checked_before_the_work_begins() {
             &["recover", "dive.mcap", "-o", wrong],
         ] {
             let answer = folder.headrace(command);
-            // Nothing on stdout: no dive was shown and no work was done.
+            // Stdout is empty, so no dive was shown and no work was done.
             assert_eq!(
                 (answer.code, answer.stdout.as_str()),
                 (Some(2), ""),
@@ -198,7 +198,7 @@ fn only_regular_files_are_ever_replaced() {
         let arguments = [&["demo", "--speed", "max", "--out", "out"], force].concat();
         let answer = folder.headrace(&arguments);
         assert_ne!(answer.code, Some(0), "{}", answer.stderr);
-        assert!(link.symlink_metadata().unwrap().is_symlink(), "{force:?}: it is gone");
+        assert!(link.symlink_metadata().unwrap().is_symlink(), "{force:?}: the link is gone");
     }
 }
 
@@ -230,7 +230,7 @@ fn command_never_writes_its_own_input() {
 
 #[cfg(unix)]
 #[test]
-fn links_to_an_input_are_detected() {
+fn output_that_links_to_an_input_is_refused() {
     use std::os::unix::fs::symlink;
     let folder = Folder::with_dive();
     std::fs::hard_link(folder.path("dive.mcap"), folder.path("hard.mcap")).unwrap();
@@ -271,7 +271,7 @@ fn two_outputs_of_a_command_must_differ() {
     }
     let simulate = ["simulate", "scene.toml", "-o", "new.mcap", "--truth", "./new.mcap"];
     two_files(&folder, &simulate, &["-o new.mcap", "./new.mcap (--truth)"]);
-    // Files without content to lose may be named twice.
+    // Two outputs may share a device, because it has no content to lose.
     #[cfg(unix)]
     accepts(&folder, &["simulate", "scene.toml", "-o", "/dev/null", "--truth", "/dev/null"], "vehicle.toml");
 }
@@ -299,7 +299,7 @@ fn expected_report_is_read_before_the_replay_and_not_replaced() {
     folder.write("broken.json", "{");
     for expected in ["none.json", "broken.json", "dive.mcap"] {
         let answer = folder.headrace(&["replay", "dive.mcap", "--expect", expected]);
-        // Nothing on stdout: nothing was replayed.
+        // Stdout is empty, so nothing was replayed.
         assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{expected}: {}", answer.stderr);
         assert!(answer.stderr.contains(expected), "{}", answer.stderr);
     }
@@ -336,12 +336,12 @@ fn existing_file_stays_if_the_new_one_cannot_be_written() {
             assert_eq!(output.status.code(), Some(1), "{command:?}: {said}");
             let told = said.contains("No space left on device") && said.contains("writing ");
             assert!(told, "{command:?}: {said}");
-            assert!(content(&folder) == before, "{command:?}: other files are left than were there");
+            assert!(content(&folder) == before, "{command:?}: the folder's files have changed");
         }
     }
 }
 
-/// A simulation killed at any point leaves no file, if the file system supports unnamed files.
+/// This requires a file system with unnamed files. The simulation may be killed at any point.
 #[cfg(target_os = "linux")]
 #[test]
 fn killed_simulation_leaves_no_file() {
@@ -362,7 +362,7 @@ fn killed_simulation_leaves_no_file() {
         if let Some(file) = opened() {
             break file;
         }
-        assert_eq!(child.try_wait().unwrap(), None, "it has ended");
+        assert_eq!(child.try_wait().unwrap(), None, "the simulation ended before the kill");
         std::thread::sleep(std::time::Duration::from_millis(10));
     };
     child.kill().unwrap();

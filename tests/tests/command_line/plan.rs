@@ -1,4 +1,4 @@
-//! `headrace plan`: its text, its JSON and CSV, and its refusals with their reasons.
+//! `headrace plan`: text, JSON and CSV output, and refusals with their reasons.
 
 use std::fmt::Write as _;
 
@@ -106,7 +106,7 @@ fn json_and_csv_have_the_same_figures() {
     }
 }
 
-/// Its spacing T meets the target but leaves no margin for position errors.
+/// At such a speed the spacing T meets the target, but without a margin for position errors.
 #[test]
 fn speed_between_plan_and_geometric_limit_misses_the_target() {
     let folder = Folder::new();
@@ -121,7 +121,7 @@ fn speed_between_plan_and_geometric_limit_misses_the_target() {
 }
 
 #[test]
-fn planning_at_v_max_gives_the_target_back() {
+fn plan_at_v_max_has_a_spacing_equal_to_the_target() {
     let folder = Folder::new();
     for tunnel in ["ceran", "rectangle,width_m=4,height_m=3", "circle,radius_m=1.2"] {
         for layout in ["phase_shift", "sector_offset"] {
@@ -152,9 +152,9 @@ fn measured_turn_times_of_a_vehicle_file_override_the_table() {
         (mode["turn_s"].as_f64().unwrap(), mode["turn_basis"].as_str().unwrap().to_owned())
     };
     assert_eq!(turn("fast"), (6.0, "measured".to_owned()));
-    // A sixth of the range from 4 m to 10 m.
+    // The range of 5 m is a sixth of the way from 4 m to 10 m, the ranges with measured times.
     assert_eq!(turn("slow"), (16.0, "estimated".to_owned()));
-    // A range shorter by 5 m saves 10 m of sound path in each of 600 pings: 4 s at 1500 m/s.
+    // A range that is shorter by 5 m saves 10 m of sound path in each of 600 pings. At 1500 m/s this is 4 s.
     let (medium_s, basis) = turn("medium");
     assert!((medium_s - (10.8 - 600.0 * 10.0 / 1500.0)).abs() < 1e-6 && basis == "estimated", "{medium_s}");
 }
@@ -264,8 +264,8 @@ fn pictures_are_identical_in_every_run() {
     }
 }
 
-/// The documents show the pictures that the command draws now. If a picture changes on purpose, renew it with the
-/// command in docs/how-to/plan/README.md.
+/// The documents must show the pictures that the command draws now. After an intended change, the command in
+/// docs/how-to/plan/README.md draws them again.
 #[test]
 fn pages_show_the_pictures_of_the_current_program() {
     let folder = Folder::new();
@@ -298,7 +298,7 @@ fn written_plan_lines_configure_the_best_mode() {
     assert!((0.0..0.001).contains(&(0.95 * v_max_mps - speed_mps)), "{speed_mps} of {v_max_mps}");
     assert_eq!(line("mode"), format!("mode = {}", best["mode"]));
     assert_eq!(written.stdout.matches("[[sensors]]").count(), 4);
-    // Replacing the vehicle's keys by these lines gives a vehicle that passes at its planned speed.
+    // A vehicle with these lines in place of its own keys passes at the speed that the lines plan.
     let old = std::fs::read_to_string(VITA_2).unwrap();
     let pasted: Vec<String> = old
         .lines()
@@ -314,7 +314,7 @@ fn written_plan_lines_configure_the_best_mode() {
     let now =
         &again["modes"].as_array().unwrap().iter().find(|mode| mode["best"] == true).unwrap()["v_max_mps"];
     assert!((now.as_f64().unwrap() - v_max_mps).abs() < 0.003, "{now} of {v_max_mps}");
-    // A pilot at the planned speed gets no too-fast alert once the heading is known, and every section passes.
+    // At the planned speed, no too-fast alert occurs once the heading is known, and every section passes.
     folder.write(
         "scene.toml",
         format!(

@@ -1,4 +1,4 @@
-//! `replay --interactive` with keys on a terminal and with commands in a pipe, and an interrupted demonstration.
+//! `replay --interactive` with keys on a terminal and with commands from a pipe, and an interrupted demonstration.
 
 use std::io::Write as _;
 use std::process::Stdio;
@@ -30,7 +30,7 @@ fn keys_control_and_end_a_replay() {
     screen.until("END      left and down seek back, q quits");
     screen.press(b"\x1b[B");
     screen.until("AT       0:00:00.000");
-    // Typed characters aren't echoed.
+    // The terminal doesn't echo typed characters.
     screen.press(b"xyzzy");
     screen.press(b"q");
     let (code, shown) = screen.end();
@@ -46,7 +46,7 @@ fn ctrl_c_and_sigterm_restore_the_terminal() {
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
     screen.until("q quit");
     screen.press(b"\x03");
-    assert!(screen.end().0.is_some(), "it ends by itself");
+    assert!(screen.end().0.is_some(), "the replay doesn't end by itself");
     assert!(screen.is_in_order());
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
     screen.until("q quit");
@@ -64,7 +64,7 @@ fn piped_commands_control_and_end_a_replay() {
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut words = child.stdin.take().unwrap();
         write!(words, "pause\nseek 10s\n{leave}\n").unwrap();
-        // The pipe stays open, so the command ends the replay.
+        // The pipe stays open, so that only the command can end the replay.
         let status = child.wait().unwrap();
         drop(words);
         assert!(matches!(status.code(), Some(0 | 1)), "{leave}: {status:?}");
@@ -76,7 +76,7 @@ fn interrupted_demonstration_keeps_its_report_and_summary() {
     let folder = Folder::new();
     let mut screen = Screen::run(&folder, &["demo", "--speed", "20x", "--out", "demo"], 100, &[]);
     screen.until("m/s");
-    // A wrapper signals the program and then its process group.
+    // A wrapper sends the signal to the program first and then to its process group.
     screen.signal(Signal::INT);
     std::thread::sleep(std::time::Duration::from_millis(5));
     screen.signal(Signal::INT);

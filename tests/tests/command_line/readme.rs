@@ -1,17 +1,18 @@
-//! Checks that the README shows the program's present output.
+//! Checks that the README shows the current output of the program.
 
 use headrace_tests::{Folder, root};
 
-/// Text before the demonstration's output in the README; the output is indented by four spaces.
+/// Text in the README before the demonstration's output, which is indented by four spaces.
 const BEGIN: &str = "leaves a report and a log in `headrace-demo/`:\n\n";
 /// Placeholder for omitted lines.
 const LEFT_OUT: &str = "    [...]";
-/// Environment variable with which this test rewrites the README.
+/// Environment variable that makes this test rewrite the README.
 const RENEW: &str = "HEADRACE_RENEW_README";
 
 /// The part of the demonstration's piped output that the README shows.
 ///
-/// It has the line of the missed section with the state after it, the line that clears it, and the summary with the metres by verdict.
+/// It consists of the line with the missed section, the state after it, the line that clears the section, and the
+/// summary with the metres by verdict.
 fn excerpt(stdout: &str) -> String {
     let lines: Vec<&str> = stdout.lines().collect();
     let missed = lines.iter().position(|line| line.contains("MISSED: ")).unwrap();
@@ -23,7 +24,7 @@ fn excerpt(stdout: &str) -> String {
     shown.join(&format!("{LEFT_OUT}\n"))
 }
 
-/// To renew it: `HEADRACE_RENEW_README=1 cargo test -p headrace_tests --test command_line readme`.
+/// Rewrite the output with `HEADRACE_RENEW_README=1 cargo test -p headrace_tests --test command_line readme`.
 #[test]
 fn readme_shows_the_current_demonstration_output() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! Sensors can be added to a loop once each, and readings withheld by their decoders are in the report.
+//! A loop accepts each sensor only once. The report counts readings that a decoder withheld.
 
 use headrace_config::Document;
 use headrace_fusion::direct::DirectNavigation;

@@ -1,7 +1,7 @@
-//! Checks reports of several kinds against docs/reference/report.schema.json, which must describe each key with its
-//! unit.
+//! Checks several kinds of reports against docs/reference/report.schema.json. The schema must describe each key with
+//! its unit.
 //!
-//! The schema uses a small part of JSON Schema (2020-12), which `headrace_tests::json_schema` checks.
+//! `headrace_tests::json_schema` checks the small part of JSON Schema (2020-12) that this schema uses.
 
 use headrace_tests::Folder;
 use headrace_tests::json_schema::faults;
@@ -64,7 +64,7 @@ fn golden_reports_match_the_schema() {
     let mut golden = bless();
     assert_eq!(faults(&schema, &golden), Vec::<String>::new());
     assert_eq!(golden["log"], Value::Null);
-    // Tolerances are kept. A golden report of an earlier version has missing keys, and they are added.
+    // Renewing a golden report keeps its tolerances and adds keys that an earlier version didn't have.
     golden["tolerances"] = serde_json::json!({"/summary/hole/max_m": 0.1});
     golden.as_object_mut().unwrap().remove("log");
     folder.write("golden.json", golden.to_string());
@@ -101,7 +101,7 @@ fn wrong_report_violates_the_schema() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// Units by the ending of a key, and their names in descriptions.
+/// Units by the ending of a key, with their names in descriptions.
 const UNITS: [(&str, &str); 11] = [
     ("_ratio", "without unit"),
     ("nis", "without unit"),
@@ -127,17 +127,17 @@ fn every_key_is_required_and_described_with_its_unit() {
             object["required"].as_array().unwrap().iter().map(|key| key.as_str().unwrap()).collect();
         required.sort_unstable();
         let mut keys: Vec<_> = properties.keys().map(String::as_str).collect();
-        // Only golden reports may have it.
+        // Only golden reports may have this key.
         keys.retain(|key| *key != "tolerances");
         keys.sort_unstable();
         assert_eq!(required, keys);
         for (key, property) in properties {
             let words =
                 property["description"].as_str().unwrap_or_else(|| panic!("{key} has no description"));
-            assert!(words.ends_with('.'), "{key}: {words:?} is no sentence");
+            assert!(words.ends_with('.'), "{key}: {words:?} isn't a sentence");
             let unit = UNITS.iter().find(|(ending, _)| key.ends_with(ending)).map(|(_, unit)| *unit);
             let number = property["type"] == "number" || property["type"][0] == "number";
-            assert_eq!(unit.is_some(), number, "{key}: a number's key ends in its unit");
+            assert_eq!(unit.is_some(), number, "{key}: the key of a number must end in its unit");
             if let Some(unit) = unit {
                 assert!(words.contains(unit), "{key}: {words:?} doesn't say {unit:?}");
             }

@@ -1,10 +1,10 @@
-//! Output of a dive on terminals of several widths, and in a pipe.
+//! Output of a dive on terminals of several widths and in a pipe.
 
 use headrace_tests::Folder;
 use headrace_tests::pty::{OnTerminal, shown_lines};
 use serde_json::Value;
 
-/// The dive starts within the tunnel, is too fast over a stretch, turns back and goes on. All heads die at the end.
+/// The dive starts inside the tunnel, is too fast over a stretch, turns back, and goes on. At its end all heads die.
 const SCENE: &str = "seed = 3\nvehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nstart_m = 3\n
 [[trajectory.legs]]\ndistance_m = 3\nspeed_mps = 0.09\n
 [[trajectory.legs]]\ndistance_m = 3\nspeed_mps = 0.4\n
@@ -62,8 +62,8 @@ fn piped_output_has_no_colours_and_no_broken_lines() {
     insta::assert_snapshot!(answer.stdout.split("digest").next().unwrap());
 }
 
-/// A pilot who has slowed down still misses the wall, now for another cause. The stretch is one run, and the new
-/// cause is announced, too.
+/// The pilot slows down, but then heads die, so the wall is still missed for another cause. The stretch stays one
+/// run, and the new cause is announced, too.
 #[test]
 fn missed_stretch_is_announced_again_when_its_cause_changes() {
     let folder = dive();

@@ -1,6 +1,6 @@
 //! Checks `--tui` on terminals of several sizes with a separate terminal emulator.
 //!
-//! Tests cover pages of golden dives at fixed times, keys, and the restored terminal after every kind of exit.
+//! The tests cover pages of golden dives at fixed times, keys, and the restored terminal after every kind of exit.
 
 use headrace_tests::screen::Screen;
 use headrace_tests::{Folder, root};
@@ -8,7 +8,7 @@ use rustix::process::Signal;
 
 const UNICODE: (&str, &str) = ("LANG", "C.UTF-8");
 
-/// Plays a golden dive on a terminal to its end, and pauses there.
+/// Plays a golden dive on a terminal to its end, where playback pauses.
 fn ended(log: &str, size: (u16, u16), variables: &[(&str, &str)]) -> (Folder, Screen) {
     let folder = Folder::new();
     let log = root().join(format!("tests/golden/{log}.mcap"));
@@ -19,7 +19,7 @@ fn ended(log: &str, size: (u16, u16), variables: &[(&str, &str)]) -> (Folder, Sc
     (folder, screen)
 }
 
-/// The page at `time`, reached from the end by `back` steps of ten seconds; the first step covers the rest.
+/// The page at `time`. It is reached by `back` steps from the end; a step goes back to a multiple of ten seconds.
 fn at(screen: &mut Screen, back: usize, time: &str) -> String {
     screen.until_page(" END ");
     for _ in 0..back {
@@ -38,7 +38,7 @@ fn golden_dives_match_snapshots_on_three_terminal_sizes() {
 }
 
 #[test]
-fn problems_are_shown_first() {
+fn tui_shows_problems_first() {
     for log in ["stalls", "adrift", "slipping-cable", "murk"] {
         let (_folder, screen) = ended(log, (80, 24), &[UNICODE]);
         let page = screen.until_page(" END ");
@@ -65,7 +65,7 @@ fn words_and_shapes_remain_on_a_terminal_without_colours_and_unicode() {
 #[test]
 fn keys_seek_in_a_replay_and_end_it() {
     let (_folder, mut screen) = ended("too-fast", (100, 30), &[UNICODE]);
-    assert!(!screen.is_in_order(), "keys come without a line end");
+    assert!(!screen.is_in_order(), "keys arrive without a line end");
     at(&mut screen, 1, "0:01:11");
     screen.press(b"\x1b[B");
     screen.until_page(" PAUSED  0:00:11");
@@ -95,11 +95,11 @@ fn keys_seek_in_a_replay_and_end_it() {
     assert!(!screen.terminal().screen().hide_cursor() && !screen.terminal().screen().alternate_screen());
 }
 
-/// Name of the exit, its action, and whether it is a regular end.
+/// An exit: its name, its action, and whether the program ends regularly.
 type Way<'a> = (&'a str, &'a dyn Fn(&mut Screen), bool);
 
 #[test]
-fn every_way_out_leaves_the_terminal_in_order() {
+fn every_exit_restores_the_terminal() {
     let folder = Folder::with_dive();
     let play = ["replay", "dive.mcap", "--tui", "--speed", "0.5x"];
     let demo = ["demo", "--tui", "--speed", "1x", "--out", "demo", "--force"];

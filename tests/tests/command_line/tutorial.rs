@@ -1,14 +1,15 @@
-//! Runs each command of docs/first-dive.md, in its order and in one folder.
+//! Runs the commands of docs/first-dive.md in order and in one folder.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use headrace_tests::{Folder, program, root};
 
-/// Options for the test only: no browser, no waiting, and a rehearsal of some seconds.
+/// Additional options for the test. They avoid the browser and all waiting, and shorten the rehearsal to some
+/// seconds.
 const QUICK: [(&str, &[&str]); 2] =
     [("demo", &["--no-open", "--speed", "max"]), ("emulate", &["--linger", "60"])];
-/// Duration of the rehearsal in the tutorial, and in the test, s.
+/// Duration of the rehearsal in the tutorial and in the test, s.
 const REHEARSAL_S: [&str; 2] = ["300", "3"];
 
 /// Lines of the page's console blocks, without their prompts.
@@ -18,7 +19,7 @@ fn commands(page: &str) -> Vec<Vec<String>> {
     lines.map(|line| line.split_whitespace().map(str::to_owned).collect()).collect()
 }
 
-/// Copies a folder of files and folders.
+/// Copies a folder with all its files and folders.
 fn copy(from: &std::path::Path, to: &std::path::Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in std::fs::read_dir(from).unwrap() {
@@ -67,7 +68,7 @@ fn tutorial_commands_succeed_in_their_order() {
             continue;
         }
         let answer = folder.headrace(&arguments);
-        // Three seconds of a rehearsal, during which the vehicle is at rest, inspect nothing.
+        // The rehearsal inspects nothing, because the vehicle is still stationary in its first three seconds.
         let is_allowed = answer.code == Some(0) || arguments[0] == "run" && answer.code == Some(1);
         assert!(is_allowed, "{arguments:?}: {:?}: {}", answer.code, answer.stderr);
     }

@@ -1,7 +1,7 @@
-//! Checks dive logs as other viewers read them, with the plain `mcap` crate.
+//! Checks dive logs from the view of other viewers, with the plain `mcap` crate.
 //!
 //! Every message under `/result/view/` must match its channel's schema and the loop's published results. Summary and
-//! indexes must be right, and a replay must ignore these messages. Checks by other readers are in `tests/viewers/`.
+//! indexes must be right, and a replay must ignore these messages. `tests/viewers/` has checks with other readers.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use headrace_tests::{Folder, VEHICLE};
 use mcap::{MessageStream, Summary};
 use serde_json::Value;
 
-/// Twenty seconds at a normal speed, then a stretch that is far too fast.
+/// Twenty seconds at a normal speed, followed by a stretch that is far too fast.
 const SCENE: &str = r#"name = "dive with a missed stretch"
 vehicle = "vehicle.toml"
 
@@ -92,7 +92,7 @@ fn every_view_message_matches_its_schema_and_the_dive() {
     let poses =
         topics["pose"].iter().map(|pose| (time_s(pose), numbers(&pose["pose"]["position"], ["x"])[0]));
     let poses: Vec<_> = poses.collect();
-    assert!(poses.windows(2).all(|two| two[0].0 < two[1].0), "times go on");
+    assert!(poses.windows(2).all(|two| two[0].0 < two[1].0), "times don't increase");
     assert!(poses.last().unwrap().1 > 18.0, "{poses:?}");
 
     let points: usize = topics["points"].iter().map(|cloud| points_of(cloud).len()).sum();
@@ -100,7 +100,7 @@ fn every_view_message_matches_its_schema_and_the_dive() {
     for cloud in &topics["points"] {
         for (head, [x_m, y_m, z_m]) in points_of(cloud) {
             assert!(head < 2 && (2.0..20.0).contains(&x_m), "head {head} at {x_m}");
-            // Points lie on a circle of 3 m radius with its lowest point at z = 0.
+            // All points lie on a circle of 3 m radius whose lowest point is at z = 0.
             assert!(((y_m * y_m + (z_m - 3.0) * (z_m - 3.0)).sqrt() - 3.0).abs() < 0.05, "{y_m}, {z_m}");
         }
     }
@@ -191,7 +191,7 @@ fn summary_and_indexes_match_a_full_read() {
     assert_eq!(stats.attachment_count as usize, summary.attachment_indexes.len());
     assert_eq!(stats.metadata_count as usize, summary.metadata_indexes.len());
     let mut indexed: BTreeMap<u16, u64> = BTreeMap::new();
-    // The first chunk has the channel definitions and no message.
+    // The first chunk contains channel definitions, but no message.
     for chunk in summary.chunk_indexes.iter().filter(|chunk| !chunk.message_index_offsets.is_empty()) {
         let indexes: Vec<_> = summary.read_message_indexes(&log, chunk).unwrap().into_iter().collect();
         for (channel, entries) in indexes {
@@ -232,7 +232,7 @@ fn verify_names_the_first_different_pose() {
     assert!(answer.stdout.contains("poses: first difference at tick"), "{}", answer.stdout);
 }
 
-/// A layout may only use existing topics and keys of their schemas.
+/// The layout may only use existing topics, and keys from the schemas of these topics.
 #[test]
 fn layout_uses_existing_topics_and_keys() {
     let (folder, _) = recorded();

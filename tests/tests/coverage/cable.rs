@@ -1,5 +1,4 @@
-//! A cable counter that gets stuck while the vehicle moves: it is reported at once, and no section passes because of
-//! it.
+//! A cable counter that gets stuck while the vehicle moves. The fault is reported at once and passes no section.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource, Single};
 use headrace_geometry::time::MonoNs;
@@ -14,12 +13,12 @@ use headrace_tests::random_dives::Draw;
 use headrace_tests::{scenes, truth};
 
 const DIVES: u64 = 24;
-/// Speed of Eq. 16 for the vehicle and mode at a target of 0.5 m, m/s.
+/// Largest speed by Eq. 16 for the vehicle and mode at a target of 0.5 m, m/s.
 const EDGE_MPS: f64 = 0.118;
 const LENGTH_M: f64 = 14.0;
 const TOLD_WITHIN_S: f64 = 2.0;
-/// Known number of sections that pass with D_true over 1.1 T. The reported sigma is too small where samples from
-/// before and during the doubt meet. The goal is zero.
+/// Known number of sections that pass with D_true over 1.1 T; the goal is zero. In these sections, samples from
+/// before and during the doubt meet, and the reported sigma is too small.
 const KNOWN_FAR: usize = 1;
 
 /// A dive during which the counter is stuck.
@@ -28,7 +27,7 @@ struct Stuck {
     from_s: f64,
 }
 
-/// Draws a dive from well within the target to well beyond it.
+/// Draws a dive. The expected holes vary from well within the target to well beyond it.
 fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     let mut draw = Draw::new(seed);
     let [least_mps, most_mps] = speeds_mps;
@@ -57,7 +56,7 @@ fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     Stuck { scene: scenes::seeded(&text, &load, Some(seed)), from_s }
 }
 
-/// Time of the update at which the loop first had the alert.
+/// Time of the first update with the alert.
 #[derive(Resource, Default)]
 struct Told(Option<MonoNs>);
 
@@ -78,7 +77,7 @@ fn watch(alerts: Res<'_, Alerts>, mut told: ResMut<'_, Told>, vehicle: Single<'_
     }
 }
 
-/// Delay of the alert after the counter got stuck, seconds.
+/// Delay between the start of the fault and the alert, seconds.
 fn told_after_s(stuck: &Stuck) -> Option<f64> {
     let vehicle = &stuck.scene.vehicle;
     let mut app = App::new(vehicle.mission());
@@ -148,8 +147,8 @@ fn stuck_cable_passes_no_section_far_over_the_target() {
     assert!(far <= KNOWN_FAR, "{far}");
 }
 
-/// A misaligned velocity log shows three quarters of the speed. The counter is right, but no other sensor tells which
-/// of the two is wrong.
+/// A misaligned velocity log measures three quarters of the speed. The counter is right, but no third sensor can
+/// decide between the two.
 #[test]
 fn velocity_log_that_contradicts_the_counter_is_reported_and_passes_nothing_wrong() {
     let log = "\n[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\nposition_m = [-0.2, 0, -0.1]\n";
@@ -172,7 +171,7 @@ fn velocity_log_that_contradicts_the_counter_is_reported_and_passes_nothing_wron
     let wrong = of(41);
     let [alert] = wrong.report.alerts.as_slice() else { panic!("{:?}", wrong.report.alerts) };
     assert_eq!((alert.kind, alert.head.as_deref()), ("cable_doubted", Some("dvl")));
-    // A quarter of the 12 m of a minute at most.
+    // The velocity log misses a quarter of the 12 m per minute at most.
     assert!((0.5..3.5).contains(&alert.worst_m), "{alert:?}");
     let target_m = wrong.report.target_m;
     let is_wrong =

@@ -1,4 +1,4 @@
-//! Scenes that each inject a single cause, and the cause that the report gives for their failed sections.
+//! Scenes with a single injected cause each, which the report must give for their failed sections.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -9,7 +9,7 @@ use headrace_tests::instrumented;
 const ALWAYS: &str = "[effects.motion_within_turn]\n[effects.range_noise]\nsd_m = 0.01\n\
     [effects.imu_noise]\ngyro_degps_rthz = 0.005\n";
 const STEADY: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.185\n";
-/// Chainages away from the ends; sections near the ends aren't passed on both sides.
+/// Chainages away from the ends. Sections near the ends aren't passed by heads from both sides.
 const INNER_M: std::ops::Range<f64> = 5.5..13.0;
 const SEEDS: u64 = 2;
 
@@ -111,7 +111,8 @@ const CASES: [Case; 11] = [
 fn named(case: &Case, seed: u64) -> BTreeMap<&'static str, u32> {
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.185");
-    // A missing return that the vehicle hides is attributed to occlusion, simulated or not.
+    // The report attributes a missing return to occlusion wherever the vehicle file says that the vehicle hides the
+    // wall. A thin body hides almost nothing.
     let thin = "plugin = \"imagenex881\"\nbody_radius_m = 0.001";
     let vehicle = match case.cause {
         "missing_returns" => vehicle.replace("plugin = \"imagenex881\"", thin),
@@ -144,7 +145,7 @@ fn reported_cause_is_the_injected_one() {
             right_of_case += named.get(case.cause).copied().unwrap_or(0);
             writeln!(table, "{:<15} {:<55} seed {seed}: {named:?}", case.cause, case.what).unwrap();
         }
-        // While the counter slips, few sections are certain enough to fail.
+        // While the counter slips, only few sections are certain enough to fail.
         if of_case < 2 || 10 * right_of_case < 9 * of_case {
             let Case { cause, what, .. } = case;
             writeln!(wrong, "{what}: {right_of_case} of {of_case} failed sections are named {cause}")
@@ -157,10 +158,10 @@ fn reported_cause_is_the_injected_one() {
     assert!(100 * right >= 95 * all, "{right} of {all}\n{table}");
 }
 
-/// Heads apart along the hull are in phase near the planned speed. Sections that fail below it would pass at it, so
-/// the cause is the phase.
+/// Heads that are apart along the hull are in phase near the planned speed. A section can therefore fail below this
+/// speed and pass at it. The cause is then the phase.
 #[test]
-fn fail_that_only_a_higher_speed_mends_is_attributed_to_phase() {
+fn failed_section_that_only_a_higher_speed_mends_is_attributed_to_phase() {
     let driven = |speed_mps: f64| {
         let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml");
         let scene = format!(

@@ -1,10 +1,10 @@
-//! Confidence of verdicts: one dive judged with a margin of one, two and three standard deviations between hole and
+//! Confidence of verdicts. One dive is judged with margins of one, two and three standard deviations between hole and
 //! target.
 
 use headrace_monitor::report::{Report, SectionReport};
 use headrace_tests::instrumented;
 
-/// Increasing speed, so that holes grow from well below the target to beyond it.
+/// The speed increases, so that the holes grow from well below the target to well beyond it.
 fn scene() -> String {
     let leg = |k: u32| {
         let speed_mps = 0.11 + 0.004 * f64::from(k);
@@ -23,7 +23,7 @@ fn judged(confidence: u32) -> Report {
     instrumented::dive(&vehicle, &scene()).report
 }
 
-/// Whether a verdict follows from the reported hole, its bounds and standard deviation.
+/// Whether the verdict follows from the bounds and the standard deviation of the reported hole.
 fn keeps_clear(report: &Report, section: &SectionReport) -> bool {
     let error_m = f64::from(report.confidence_sd) * section.hole_sd_m;
     let passes = section.hole_most_m.is_some_and(|most_m| most_m + error_m <= report.target_m);

@@ -1,20 +1,21 @@
-//! Counters with 1 cm resolution on swinging cables: they cause no wrong displayed speed and no wrong verdict.
+//! Counters with a resolution of 1 cm on swinging cables cause no wrong displayed speed and no wrong verdict.
 
 use headrace_simulator::Scene;
 use headrace_tests::{scenes, truth};
 
 /// Number of dives of each kind.
 const DIVES: u64 = 8;
-/// Largest allowed error of the displayed speed, m/s. The fault displayed 0.98 for a vehicle at 0.2.
+/// Largest allowed error of the displayed speed, m/s. The fault that this test guards against displayed 0.98 for a
+/// vehicle at 0.2.
 const SPEED_OFF_MPS: f64 = 0.2;
 
-/// Legs: distance between stops, m, speed on it, m/s, and duration of the stop at its end, s.
+/// Legs of a dive: distance, m, speed, m/s, and duration of the stop at the end, s.
 type Legs = &'static [(f64, f64, f64)];
 const STEADY: Legs = &[(14.0, 0.2, 0.0)];
 const STOP_AND_GO: Legs = &[(3.0, 0.3, 6.0), (2.0, 0.2, 11.0), (4.0, 0.31, 4.0), (3.0, 0.25, 0.0)];
 const WANDERING: &str = "tether_slack = { reach_m = 0.06, period_s = 30 }\n";
-/// Three swings with a total reach of 10 cm, one of them as long as a head's turn. The inertial unit's attitude
-/// wanders at the cable's rate.
+/// Three simultaneous swings with a total reach of 10 cm; the period of one equals the turn time of a head. The
+/// attitude of the inertial unit wanders at the same rate as the cable.
 const SWINGING: &str = "tether_slack = { swings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.021, period_s = 10 }, \
     { reach_m = 0.055, period_s = 20 }] }\n";
 
@@ -42,10 +43,10 @@ fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
 struct Wrong {
     /// Largest error of the displayed speed while there is a fix, m/s.
     speed_mps: f64,
-    /// Sections that pass with a true hole over 1.1 T, or fail with one below 0.9 T.
+    /// Number of sections that pass with a true hole over 1.1 T, and number that fail with a true hole below 0.9 T.
     passed: usize,
     failed: usize,
-    /// Sections with the verdict can't say, and all sections.
+    /// Number of sections with the verdict can't say, and number of all sections.
     cannot_say: usize,
     sections: usize,
 }
@@ -73,7 +74,7 @@ fn wrong(scene: &Scene, most_mps: f64) -> Wrong {
     wrong
 }
 
-/// Wrong results of all dives of a kind, and the share of sections with the verdict can't say.
+/// Wrong results over all dives of a kind, and the share of sections with the verdict can't say.
 fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     let most_mps = legs.iter().fold(0.0, |most: f64, (_, speed_mps, _)| most.max(*speed_mps));
     let mut all = Wrong::default();
@@ -92,8 +93,8 @@ fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     (all, share)
 }
 
-/// With a cable that swings by 11 cm but is declared taut, many sections stay undecided. For a unit of this class a
-/// change of 5 cm/s may as well be the vehicle. Nothing passes wrongly.
+/// If the cable swings by 11 cm but is declared taut, many sections stay undecided. This inertial unit can't
+/// distinguish a speed change of the cable by 5 cm/s from one of the vehicle. No section passes wrongly.
 #[test]
 fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
     let (wandering, swinging) = ([WANDERING, "0.06 m"], [SWINGING, "0.11 m"]);
@@ -107,7 +108,8 @@ fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
         println!("slack of {reach}: {wrong:?}, can't say {:.1} %", 100.0 * cannot_say);
         assert!(wrong.sections > 200, "{reach}: {wrong:?}");
         assert!(wrong.speed_mps < SPEED_OFF_MPS, "{reach}: {wrong:?}");
-        // A false fail costs a way back, but a false pass may miss a rock. One section in a hundred may fail falsely.
+        // A false fail costs a drive back, but a false pass may miss a rock. So one section in a hundred may fail
+        // falsely.
         assert!(wrong.passed == 0 && 100 * wrong.failed <= wrong.sections, "{reach}: {wrong:?}");
         assert!(cannot_say <= most, "{reach}: {cannot_say}");
     }

@@ -1,7 +1,6 @@
-//! Every metre of the dive is accounted for, and a dive without a position says so first.
+//! The report accounts for every metre of the dive. A dive without a position says so first.
 //!
-//! Each section that the vehicle or its heads have entered has a verdict or is open, whether a head looked there or
-//! not.
+//! Each section that the vehicle or its heads have entered is judged or open, even if no head has looked at it.
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::report::{Report, SectionReport};
@@ -11,12 +10,12 @@ use headrace_tests::{Folder, SCENE, VEHICLE as SHORT, instrumented};
 use crate::dives::DIVES;
 
 const VEHICLE: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
-/// Distance of VITA 2's heads ahead of and behind its origin, m.
+/// Distance of VITA 2's heads from its origin, both ahead of it and behind it, m.
 const HEAD_M: f64 = 0.551;
 const START_M: f64 = 3.0;
 const SPEED_MPS: f64 = 0.11;
 
-/// A steady dive at the planned speed of the heads, with these effects.
+/// A steady dive at the planned speed with these effects.
 fn steady(distance_m: f64, effects: &str) -> Report {
     let scene = format!(
         "seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n[[trajectory.legs]]\n\
@@ -31,7 +30,7 @@ fn silence(sensors: &str, span: &str) -> String {
 
 const ALL: &str = r#""sonar_0", "sonar_1", "sonar_2", "sonar_3""#;
 
-/// Checks that lengths by verdict add up to the coverage extent, and that the report lists its sections without gaps.
+/// Checks that lengths by verdict add up to the coverage extent, and that the list of sections has no gaps.
 #[track_caller]
 fn accounted_for(what: &str, report: &Report) {
     let all_m = report.summary.way_m();
@@ -50,7 +49,7 @@ fn accounted_for(what: &str, report: &Report) {
     assert!(report.sections.iter().all(judged), "{what}");
 }
 
-/// Checks that a section fails because these heads were silent.
+/// Checks that a section fails because of these silent heads.
 #[track_caller]
 fn fails_by_silence(section: &SectionReport, heads: &[usize]) {
     let evidence = section.cause.unwrap();
@@ -59,20 +58,19 @@ fn fails_by_silence(section: &SectionReport, heads: &[usize]) {
     assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
 }
 
-/// Time at which the plane `behind_m` behind the vehicle has left a section by half the target, seconds after the
-/// start.
+/// Time at which a plane `behind_m` behind the vehicle is half a target beyond a section, seconds after the start.
 fn left_s(section: &SectionReport, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
 }
 
-/// Delay of the section's flag after that moment, seconds.
+/// Delay of a section's flag after [`left_s`], seconds.
 fn late_s(report: &Report, section: &SectionReport, behind_m: f64) -> f64 {
     section.flagged_s.unwrap() - report.dive.start_s - left_s(section, behind_m)
 }
 
 #[test]
 fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
-    // The heads die at 5.2 m, with the rear heads at 4.65 m.
+    // The heads die when the vehicle is at 5.2 m and the rear heads are at 4.65 m.
     let report = steady(9.0, &silence(ALL, "from_s = 20"));
     accounted_for("dead", &report);
     assert!(report.coverage_extent.to_m.unwrap() > START_M + 9.0, "{:?}", report.coverage_extent);
@@ -82,21 +80,21 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
     for section in dark {
         fails_by_silence(section, &[0, 1, 2, 3]);
         let late_s = late_s(&report, section, HEAD_M);
-        // The limit is one update plus the position margin on half the target. The earliest moment is when the
-        // section's start is left, since a circle about it may be large enough.
+        // The latest moment allows for one update and the position margin. At the earliest, the flag is raised when
+        // the section's start is left, since a circle about that start may be large enough.
         assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
     let home = report.go_back.iter().map(|back| back.from_m).fold(0.0, f64::max);
-    assert!(home > 10.5, "the way home goes to where the vehicle went: {home}");
+    assert!(home > 10.5, "the advice for the way back misses the last sections: {home}");
     let run = report.runs.iter().find(|run| run.cause.as_str() == "head_silent").unwrap();
     assert_eq!(run.silent_sources, ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]);
     let last = report.sections.last().unwrap();
-    assert_eq!(last.verdict, "open", "what lies ahead may still be seen when a head comes back");
+    assert_eq!(last.verdict, "open", "a head may recover and still see the wall ahead");
 }
 
 #[test]
 fn stretch_between_loss_and_return_of_heads_fails() {
-    // The heads are dead from 5.75 m to 8.5 m.
+    // The heads are dead while the vehicle moves from 5.75 m to 8.5 m.
     let report = steady(9.0, &silence(ALL, "from_s = 25\nfor_s = 25"));
     accounted_for("dead and back", &report);
     let between = |from_m: f64, to_m: f64| {
@@ -163,7 +161,7 @@ fn section_crossed_on_the_way_back_is_judged_like_any_other() {
 }
 
 #[test]
-fn tick_boundaries_do_not_change_verdicts_of_dead_heads() {
+fn tick_length_does_not_change_verdicts_while_heads_are_dead() {
     let silence = silence(ALL, "from_s = 8\nfor_s = 6");
     let scene = format!(
         "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 4\n\
@@ -182,17 +180,17 @@ fn flags_wait_only_for_live_heads() {
     assert!(inner.len() > 10);
     for section in inner {
         fails_by_silence(section, &[1, 2, 3]);
-        // The front head leaves it ten seconds before the aft heads would.
+        // The flag follows the live front head, which leaves the section ten seconds before the silent aft heads do.
         let late_s = late_s(&report, section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
-    // One of four heads, at a speed that suits three.
+    // One of four heads is silent; the speed suits three heads.
     let silent = silence("\"sonar_1\"", "from_s = 10");
     let (one, none) = (steady(6.0, &silent), steady(6.0, ""));
     accounted_for("one of four", &one);
     for report in [&one, &none] {
         let judged = report.sections.iter().filter(|s| s.end_m <= 7.5);
-        // At the start, not all heads have passed.
+        // Near the start and the end, not all heads have passed.
         let beyond = |s: &&SectionReport| !s.not_inspected;
         assert!(judged.clone().filter(beyond).count() > 12);
         assert!(judged.filter(beyond).all(|s| s.verdict != "open"));
@@ -211,7 +209,7 @@ fn verdict_lengths_add_up_in_random_dives() {
     }
 }
 
-/// Short dives in and beyond a short tunnel, out and back, that end anywhere within a section.
+/// Short dives out and back that reach beyond a short tunnel and end at any place in a section.
 #[test]
 fn verdict_lengths_add_up_wherever_a_dive_begins_turns_and_ends() {
     let vehicle = SHORT.replace("length_m = 100", "length_m = 8");
@@ -255,7 +253,7 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
         let what = format!("seed {seed}");
         accounted_for(&what, report);
         let Some(to_m) = report.coverage_extent.to_m else { continue };
-        // Heads are at most 0.6 m from the vehicle, in either direction; a section is left by half the target.
+        // Heads are at most 0.6 m ahead of or behind the vehicle. A section counts as left after half the target.
         let (target_m, section_m) = (report.target_m, report.section_m);
         let seen_m = dive.samples().map(|sample| sample.place[0]).fold(f64::NEG_INFINITY, f64::max);
         let far = |s: &&SectionReport| s.start_m > seen_m + target_m;
@@ -278,7 +276,7 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
 
 #[test]
 fn stretch_without_a_position_counts_and_fails_when_left() {
-    // The filter drops its fix some seconds after the cable falls silent.
+    // Some seconds after the cable falls silent, the filter drops its fix.
     let report = steady(12.0, &silence("\"tether\"", "from_s = 25\nfor_s = 50"));
     accounted_for("outage", &report);
     let lost =
@@ -343,8 +341,8 @@ fn dive_mostly_without_a_position_exits_with_1() {
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
 }
 
-/// Samples placed while the estimate settles say nothing about later ones. A vehicle that waits until its heading is
-/// known loses only the metres that its front heads saw meanwhile.
+/// Samples from the time when the estimate settles don't affect later sections. A vehicle that waits for a known
+/// heading loses only the metres that its front heads saw while it waited.
 #[test]
 fn waiting_for_a_known_heading_leaves_no_undecided_metre() {
     let vehicle = VEHICLE.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.09");

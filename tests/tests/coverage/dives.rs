@@ -1,4 +1,4 @@
-//! Two hundred short dives of all kinds, simulated once for the tests of holes and flags.
+//! Two hundred short dives of all kinds. They are simulated once, for the tests of holes and of flags.
 
 use std::sync::LazyLock;
 

@@ -1,6 +1,6 @@
-//! Two hundred dives with one broken device each: no section passes whose true hole is far over the target.
+//! Two hundred dives with one broken device each. No section passes with a true hole far over the target.
 //!
-//! Seeds rotate through all senses and faults; begin, duration and size are drawn.
+//! The seeds rotate through all senses and faults. Start, duration and size of a fault are drawn.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +11,10 @@ use headrace_tests::random_dives::Draw;
 const SEEDS: u64 = 200;
 const LENGTH_M: f64 = 7.0;
 
-/// Largest share of sections with D_true over T that may pass.
+/// Largest share of passed sections among those with D_true over T.
 const MOST_OVER: f64 = 0.025;
 
-/// A cell from well within the target to well beyond it, near the portal or far from it.
+/// A cell with expected holes from well within the target to well beyond it, near the portal or far from it.
 fn cell(seed: u64) -> Cell {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let mut draw = Draw::new(seed);

@@ -1,4 +1,4 @@
-//! A tenth of the field table: cells that are quick to run, checked for results that must never occur.
+//! A tenth of the field table: cells with a short running time, checked for results that must never occur.
 //!
 //! `cargo bench -p headrace_tests --bench field` computes the whole table.
 
@@ -29,7 +29,7 @@ fn print(name: &str, figures: &Figures) {
     );
 }
 
-/// No section far over the target passes, and at most one in forty of those over it.
+/// No section far over the target passes. At most one in forty of all sections over the target passes.
 #[test]
 fn passed_sections_are_within_the_target() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
@@ -53,8 +53,8 @@ fn passed_sections_are_within_the_target() {
     }
 }
 
-/// On walls as rough as the vehicle file allows, errors of D match their standard deviation in both directions.
-/// Echosounders see one bump for seconds and must not take it for a position change.
+/// On walls as rough as the vehicle file allows, errors of D match their standard deviation, which is neither too
+/// small nor too large. An echosounder sees the same bump for seconds, which must not look like a change of position.
 #[test]
 fn wall_bumps_do_not_bias_the_position() {
     for name in ["vita2-4", "pipe", "bluerov2"] {
@@ -70,8 +70,8 @@ fn wall_bumps_do_not_bias_the_position() {
     }
 }
 
-/// A vehicle that is stationary for half a minute with the program running learns its gyro bias first. It then knows
-/// its heading sooner.
+/// During a stop of half a minute before the dive, the program learns the gyro bias. The vehicle then knows its
+/// heading sooner.
 #[test]
 fn initial_stop_gives_earlier_verdicts() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
@@ -83,10 +83,10 @@ fn initial_stop_gives_earlier_verdicts() {
         figures.share(2)
     });
     assert!(at_once > 0.05, "{at_once}: there is nothing to gain");
-    assert!(stood <= 0.02, "{stood} of metres can't be said, {at_once} without standing");
+    assert!(stood <= 0.02, "share of undecided metres: {stood} with a stop, {at_once} without");
 }
 
-/// Passing everything counts every false pass, and failing everything every false fail.
+/// If every verdict is pass, all false passes are counted. If every verdict is fail, all false fails are counted.
 #[test]
 fn figures_count_false_verdicts() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
@@ -109,7 +109,7 @@ fn figures_count_false_verdicts() {
     };
     let passed = all("pass");
     assert!(passed.over > 5 && passed.passed_over == passed.over, "{passed:?}");
-    // The ends count too, where a section has a neighbour on one side only.
+    // These figures include the dive's ends, where a section has a neighbour on one side only.
     assert!((1..=passed.over).contains(&passed.passed_far), "{passed:?}");
     assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
     let failed = all("fail");

@@ -1,7 +1,7 @@
 //! Checks the flags of two hundred short dives against their definition.
 //!
-//! A flag is raised when going on forward can no longer undo a fail, and cleared when a later pass fills the hole.
-//! The oracle has the poses and all samples, but not the order in which sections are judged.
+//! A flag is raised when further forward motion can no longer undo a fail, and cleared when a later pass fills the
+//! hole. The oracle has the poses and all samples, but not the order in which the loop judges sections.
 
 use std::sync::LazyLock;
 
@@ -13,8 +13,8 @@ use headrace_tests::random_dives::{Kind, Seeded};
 
 use crate::dives::DIVES;
 
-/// A dive with its due flags for two kinds of fail: a hole larger than the target, or larger by two of its standard
-/// deviations.
+/// A dive with the flags that are due for two definitions of a fail. The hole exceeds the target, or it exceeds the
+/// target by two standard deviations.
 struct Judged {
     seeded: &'static Seeded,
     dive: &'static Dive,
@@ -32,7 +32,8 @@ static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
     DIVES.iter().map(judge).collect()
 });
 
-/// Collects the flag errors that `wrong` finds in each section, from the flags due at the target and at two sigma.
+/// Checks every section with `wrong`, which gets the section's due flags for both definitions and may return an
+/// error.
 #[track_caller]
 fn every_flag(
     dives: impl Fn(&Judged) -> bool,
@@ -51,10 +52,11 @@ fn every_flag(
     assert!(said.is_empty(), "{} of {raised} flags: {:#?}", said.len(), &said[..said.len().min(8)]);
 }
 
-/// Flags wait until the section's end is passed or the vehicle is stationary, s.
+/// Longest additional delay, s. A flag waits until the heads have passed the section's end or the vehicle is
+/// stationary.
 const SOON_S: f64 = 3.0;
 
-/// Whether a flag was raised before its due moment, or without one.
+/// Whether a flag was raised before its due moment, or raised although none was due.
 fn is_early(judged: &Judged, due: &Flag) -> bool {
     due.raised_s
         .is_some_and(|raised_s| due.may_s.is_none_or(|may_s| raised_s < may_s - 1.5 * EVERY.as_secs_f64()))
@@ -94,21 +96,21 @@ fn flag_of_a_moving_vehicle_is_raised_within_one_turn() {
     );
 }
 
-/// Distance that the heads may have moved when a flag is raised, m (`docs/why/coverage.md`, "Verdicts").
+/// Longest distance that the heads may move before the flag is raised, m (`docs/why/coverage.md`, "Verdicts").
 const LATE_M: f64 = 0.25;
-/// Settling time of the estimate from the start, seconds: alignment, and 20 s.
+/// Time from the start until the estimate has settled, seconds: the alignment, and another 20 s.
 const SETTLED_S: f64 = 22.0;
 
 #[test]
-fn flag_is_raised_within_25_cm_of_its_due_moment() {
+fn flag_is_raised_within_25_cm_of_the_point_of_no_return() {
     let (mut late, mut on_time) = (Vec::new(), 0);
     for judged in JUDGED.iter().filter(|judged| forward(judged) && judged.seeded.kind != Kind::Parked) {
-        // With a filter, standard deviations differ from place to place. A flag counts as due if the definition with
-        // a third one gives it.
+        // With a filter, standard deviations differ from place to place. So a flag counts as due only if the hole
+        // exceeds the target by three standard deviations.
         let flags =
             if direct(judged) { &judged.by_two_sigma } else { &judged.journey.flags(judged.dive, 3.0) };
         for flag in flags {
-            // Standard deviations shrink while the estimate settles, but the report only has the final ones.
+            // Standard deviations shrink while the estimate settles, but the report contains only the final ones.
             let settles = !direct(judged) && flag.due_s.is_some_and(|due_s| due_s < SETTLED_S);
             let is_late = flag.late_m.filter(|_| !settles).map(|late_m| late_m > LATE_M);
             on_time += u32::from(is_late == Some(false));
@@ -183,7 +185,8 @@ fn end_of_a_dive_raises_no_flag() {
 
 #[test]
 fn no_flag_is_raised_while_the_fail_can_still_be_undone() {
-    // Judged by the final standard deviation; with a filter it was different when the flag was raised.
+    // Dives with a filter are left out. Their standard deviation differed from the final one when the flag was
+    // raised.
     every_flag(
         |judged| forward(judged) && direct(judged),
         |judged, _, due| is_early(judged, due).then_some("raised though going on could have undone it"),
@@ -195,7 +198,7 @@ fn flag_of_a_stationary_or_returning_vehicle_is_raised_within_one_turn() {
     every_flag(
         |judged| direct(judged) && matches!(judged.seeded.kind, Kind::Parked | Kind::Reversing),
         |judged, _, due| {
-            // A vehicle that turns back at that moment may still undo the fail.
+            // If the vehicle turns back at the due moment, it may still undo the fail.
             let due_s = due.due_s.filter(|due_s| {
                 let back_s = judged.journey.turned_back_s();
                 !(back_s - 3.0..judged.journey.turned_on_s()).contains(due_s)

@@ -1,5 +1,5 @@
-//! Impossible walls: samples outside the tunnel, and a profile that contradicts the returns. Both are reported once,
-//! counted, and never pass.
+//! Impossible walls: samples outside the tunnel, and a profile that contradicts the returns. Both are reported once
+//! and counted, and they pass no section.
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 use serde_json::Value;
@@ -66,8 +66,8 @@ fn declared_opening_is_listed_and_does_not_fail() {
         .map(|section| section["start_m"].as_f64().unwrap())
         .collect();
     assert_eq!(masked, [4.0, 4.25, 4.5, 4.75, 5.0, 5.25]);
-    // The opening covers two of twelve hours. From 4.2 to 5.4 m it takes a fifth of the first section and three
-    // fifths of the last.
+    // The opening covers two of twelve hours, from 4.2 to 5.4 m. It covers a fifth of the first section and three
+    // fifths of the last one.
     let share = |start_m: f64| {
         let section =
             report["sections"].as_array().unwrap().iter().find(|s| s["start_m"] == start_m).unwrap();

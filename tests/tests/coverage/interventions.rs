@@ -1,4 +1,4 @@
-//! Causes by intervention: a tenth of the bench's dives.
+//! Checks causes by intervention, with a tenth of the bench's dives.
 
 use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
 
@@ -13,7 +13,7 @@ fn removing_the_reported_cause_passes_the_section() {
             .filter(|seed| seed % threads == thread)
             .map(|seed| {
                 let dive = intervene(10 * seed + seed % 2, &kinds(10 * seed + seed % 2));
-                // In half of the dives the displayed remedy is simulated.
+                // The displayed remedy is simulated for half of the dives.
                 let done = if seed % 4 < 2 { remedies(&dive) } else { Vec::new() };
                 (dive, done)
             })

@@ -1,4 +1,4 @@
-//! Memory grows with the distance covered, not with time: a stationary vehicle fills none.
+//! Memory grows with the distance covered, not with time. A stationary vehicle needs no additional memory.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
@@ -8,14 +8,14 @@ use headrace_simulator::{START, Simulation};
 use headrace_tests::scenes;
 use headrace_vehicle::Mission;
 
-/// A minute of motion, then an hour stationary with noise.
+/// A minute of motion, followed by an hour in which the vehicle is stationary and its sensors have noise.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoints\"\n\
     [[trajectory.waypoints]]\nchainage_m = 5\n\
     [[trajectory.waypoints]]\nchainage_m = 17\nspeed_mps = 0.2\nstay_s = 3600\n\
     [[trajectory.waypoints]]\nchainage_m = 17.1\nspeed_mps = 0.2\n\
     [effects]\nrange_noise = { sd_m = 0.02 }\n";
 
-/// Memory that may grow once the loop is armed: bytes of samples, and entries of the advice's history.
+/// Amounts that may grow in an armed loop: bytes of samples, and entries of the advice's history.
 fn used(dive: &Loop) -> [usize; 2] {
     [dive.coverage().store.usage().bytes, dive.advice_log().entries.len()]
 }
@@ -49,6 +49,6 @@ fn stationary_vehicle_does_not_grow_memory() {
     }
     let [early, late] = [seen[seen.len() / 2].1, seen.last().unwrap().1];
     assert!(late[0] * 100 <= early[0] * 105, "samples: {early:?}, then {late:?} bytes");
-    // One entry every ten seconds, and a few more.
+    // The history has one entry every ten seconds, plus a few.
     assert!(late[1] < 500, "advice: {late:?} entries");
 }

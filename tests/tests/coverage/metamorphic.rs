@@ -1,6 +1,7 @@
-//! Transformations that must not change results.
+//! Transformations of a dive that must not change its results.
 //!
-//! These are a mirror, other origins of chainage and arc length, names and order of heads, and the tick length.
+//! They are a mirror, other origins of chainage and arc length, other names and another order of heads, and another
+//! tick length.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -18,13 +19,13 @@ use serde_json::Value;
 
 const TOLERANCE_M: f64 = 1e-9;
 
-/// Two dives whose results must agree after a transformation.
+/// Two dives with results that must agree after a transformation.
 struct Beside<'a> {
     here: &'a Dive,
     there: &'a Dive,
     /// Chainage offset of the second dive, m.
     along_m: f64,
-    /// Map from arc lengths of the second dive to those of the first.
+    /// Maps arc lengths of the second dive to those of the first.
     around: &'a dyn Fn(f64) -> f64,
 }
 
@@ -38,7 +39,7 @@ impl Beside<'_> {
         let verdicts: std::collections::BTreeSet<_> = here.iter().map(|section| section.verdict).collect();
         assert!(
             verdicts.contains("fail") && verdicts.contains("pass"),
-            "a dive that shows little: {verdicts:?}"
+            "the dive has too few kinds of verdicts: {verdicts:?}"
         );
         for (a, b) in here.iter().zip(there) {
             let wrong = self.differs(&wall, a, b);
@@ -61,7 +62,8 @@ impl Beside<'_> {
                 && both(deviations[0], deviations[1])
         };
         let cause = |section: &SectionReport| section.cause.map(|evidence| evidence.cause);
-        // If several holes have the same size, the dives may report different ones. The place must be a hole in both.
+        // The dives may report different holes of the same size. The hole reported for the second dive must be one of
+        // the first, too.
         let is_hole_here = b.hole_x_m.zip(b.hole_arc_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {
             near(2.0 * wall.clear_m([x - self.along_m, (self.around)(sigma)]), hole_m)
         });
@@ -84,8 +86,10 @@ impl Beside<'_> {
     }
 }
 
-/// A vehicle without a filter, with heads at these places of the body frame. A `side` of -1 mirrors places, direction
-/// of the heads' turns, and direction of the echosounders.
+/// A vehicle without a filter, with heads at these places in the body frame.
+///
+/// If `side` is -1, the places, the turning direction of the heads, and the directions of the echosounders are
+/// mirrored.
 fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     let mut text = format!(
         "target_m = 0.7\n[tunnel]\nlength_m = 1200\n{tunnel}\n[navigation]\nway = \"direct\"\n[heads]\nplanned_speed_mps = 0\n"
@@ -111,7 +115,7 @@ fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     text
 }
 
-/// Slow enough, then too fast, and back over a part.
+/// The dive is slow enough at first, then too fast, and returns over a part of its path.
 fn legs(start_m: f64, place_m: [f64; 2]) -> String {
     let mut text = format!(
         "vehicle = \"vehicle.toml\"\n[effects]\nmotion_within_turn = {{}}\n[trajectory]\nstart_m = {start_m}\nplace_m = {place_m:?}\n"
@@ -125,7 +129,7 @@ fn legs(start_m: f64, place_m: [f64; 2]) -> String {
 const CIRCLE: &str = "profile = \"circle\"\nradius_m = 2";
 const HEADS: [[f64; 2]; 2] = [[0.4, 0.1], [-0.3, 0.05]];
 
-/// A mirrored vehicle in a mirrored tunnel would have sent the same bytes.
+/// A mirrored vehicle in a mirrored tunnel sends the same bytes.
 #[test]
 fn wall_mirror_mirrors_the_report() {
     let corners = [[-1.8, 0.0], [2.2, 0.0], [2.6, 1.4], [1.0, 3.0], [-1.4, 2.6], [-2.1, 1.0]];
@@ -195,14 +199,14 @@ fn tick_length_does_not_change_results() {
     }
 }
 
-/// The vehicle file with its heads, which come first, in another order.
+/// The vehicle file with another order of heads, which are its first sensors.
 fn reordered(vehicle: &str, heads: usize) -> String {
     let mut tables: Vec<&str> = vehicle.split("[[sensors]]\n").collect();
     tables[1..=heads].reverse();
     tables.join("[[sensors]]\n")
 }
 
-/// The report's results on the wall and for the pilot.
+/// Results in the report under these keys.
 fn answers<'a>(report: &'a Value, keys: &[&str]) -> Vec<&'a Value> {
     assert!(report["summary"]["flags_raised"].as_u64().unwrap() > 5, "{}", report["summary"]);
     keys.iter().map(|key| &report[*key]).collect()
@@ -218,8 +222,8 @@ fn head_order_does_not_change_results() {
     let (_, expected) = folder.replay("dive.mcap", &[]);
     folder.write("reordered.toml", reordered(&vehicle, 3));
     let (_, got) = folder.replay("dive.mcap", &["--vehicle", "reordered.toml"]);
-    assert_eq!(got["sources"][0]["id"], "sonar_2", "the order is another");
-    // Phases depend on the order of the heads, and so do causes: start angles are assigned in that order.
+    assert_eq!(got["sources"][0]["id"], "sonar_2", "the order of heads hasn't changed");
+    // Causes may differ. Start angles, and so phases, are assigned in the order of the heads.
     let [got, expected] = [got, expected].map(|mut report| {
         for section in report["sections"].as_array_mut().unwrap() {
             section.as_object_mut().unwrap().remove("cause");
@@ -230,7 +234,7 @@ fn head_order_does_not_change_results() {
     assert_eq!(answers(&got, &keys), answers(&expected, &keys));
 }
 
-/// A message whose channel has another name.
+/// A message with another name of its channel.
 fn renamed<'a>(message: &Message<'a>, named: &dyn Fn(&str) -> String) -> Message<'a> {
     let metadata = message.channel.metadata.iter().map(|(key, value)| (key.clone(), named(value))).collect();
     let topic = named(&message.channel.topic);

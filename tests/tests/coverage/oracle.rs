@@ -1,7 +1,7 @@
 //! Checks holes, spacings and verdicts of two hundred short dives against an oracle.
 //!
-//! The oracle uses only all samples and the definitions. It has no cells, no search radius and no order of judging.
-//! `flags.rs` has the flags.
+//! The oracle uses only the samples and the definitions. It has no cells, no search radius, and no order of judging.
+//! Flags are checked in `flags.rs`.
 
 use std::collections::BTreeMap;
 
@@ -17,10 +17,10 @@ use headrace_tests::spacings::{Spacing, spacings, spread};
 use crate::dives::DIVES;
 
 const TOLERANCE_M: f64 = 1e-9;
-/// Limit of the search for holes, m; the report calls larger ones unbounded.
+/// Limit of the search for holes, m. The report calls larger holes unbounded.
 const SEARCH_M: f64 = 12.0;
 
-/// Checks every section of every dive with `misses`, which returns a description of an error.
+/// Checks every section of every dive with `misses`, which may return the description of an error.
 #[track_caller]
 fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionReport) -> Option<String>) {
     let mut said = Vec::new();
@@ -68,8 +68,8 @@ fn is_within(section: &SectionReport, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section has passed by the samples of some of its visits. Samples of other visits could only make its
-/// hole smaller.
+/// Whether a section passed with the samples of only some visits. Samples of other visits can only make its hole
+/// smaller.
 fn is_of_a_visit(section: &SectionReport, diameter_m: f64) -> bool {
     let most_m = section.hole_most_m.filter(|_| section.verdict == "pass");
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
@@ -86,7 +86,7 @@ fn holes_are_the_largest_empty_circles() {
                 !section.hole_bounded && hole_m <= expected_m && ["fail", "open"].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
-        // Packing moves samples by micrometres, which the bounds include.
+        // Packing moves samples by micrometres; the bounds include this movement.
         let right =
             section.hole_bounded && (is_within(section, expected_m) || is_of_a_visit(section, expected_m));
         (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
@@ -111,17 +111,17 @@ fn verdicts_follow_from_hole_sigma_and_target() {
         let largest = wall.largest(section.start_m, section.end_m)?;
         let (hole_m, target_m, twice_m) =
             (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sd_m);
-        // Holes that going on forward could still fill leave the section open.
+        // A section stays open if further forward motion could still fill its hole.
         let reached = reached(dive);
         let (rear_m, passed_m) = (reached.last()?.rear_m, all_passed_from_m(&reached));
         let radius_m = f64::midpoint(target_m, twice_m);
         let ends = [section.start_m, section.end_m];
         let first_m = first_failing_m(wall, ends, radius_m, passed_m);
-        // Whether a circle lies right at the edge of the part that all heads have passed.
+        // Whether a circle touches the limit of the part that all heads have passed.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
-        // The first such circle is known to a part of the section. The program uses the largest deviation round the
-        // wall, and the farthest wall for the reach of a tilted head.
+        // The place of the first such circle is known to one part of the section. The program uses the largest
+        // standard deviation round the wall, and takes the farthest wall as the reach of a tilted head.
         let near_m = (section.end_m - section.start_m) / f64::from(PARTS) + 2.0 * section.hole_sd_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
@@ -143,8 +143,9 @@ fn verdicts_follow_from_hole_sigma_and_target() {
     });
 }
 
-/// Describes how a spread differs from that of these values; `None` if it matches. Variances are compared, because
-/// the deviation of equal values is the root of a rounding error.
+/// Describes how a reported spread differs from that of these values; `None` if both match.
+///
+/// Variances are compared, because the standard deviation of equal values is the root of a rounding error.
 fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
     let expected = spread(values);
     let figures = [got.min_m, got.mean_m, got.max_m, got.sd_m.map(|sd_m| sd_m * sd_m)];
@@ -190,7 +191,7 @@ fn spacings_of_every_section_match_their_definitions() {
             }
         }
     }
-    assert!(10 * judged > 7 * sections, "{judged} of {sections} sections without ends of rows");
+    assert!(10 * judged > 7 * sections, "{judged} of {sections} sections without end points of series");
 }
 
 // Tests of the oracle itself.
@@ -207,21 +208,22 @@ fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
 }
 
 #[test]
-fn lattices_have_their_known_holes() {
+fn holes_of_lattices_match_their_exact_values() {
     let diagonal_m = math::sqrt(2.0);
-    // Squares of 0.25 m, with all corners on common circles, and the same seen from a section without a centre.
+    // A lattice of squares of 0.25 m, in which all four corners of a square are on a common circle. The second
+    // section contains no centre of a square.
     let squares = Wall::new(lattice(20, 24, |i, j| [0.25 * i, 0.25 * j]), 6.0).unwrap();
     holds(&squares, 1.0, 1.25, 0.25 * diagonal_m);
     holds(&squares, 1.0, 1.05, 2.0 * math::hypot(0.05, 0.125));
-    // Rows offset by half a step: triangles with sides of 0.4 m.
+    // Rows that are offset by half a step form triangles with sides of 0.4 m.
     let height_m = 0.2 * math::sqrt(3.0);
     let triangles =
         Wall::new(lattice(20, 10, |i, j| [height_m * i, 0.4 * j + 0.2 * (i % 2.0)]), 4.0).unwrap();
     holds(&triangles, 1.0, 2.0, 0.8 / math::sqrt(3.0));
-    // A single ring: the hole grows with the distance.
+    // A single ring of samples: the hole grows with the distance from the ring.
     let ring = Wall::new(lattice(1, 10, |_, j| [0.0, 0.3 * j]), 3.0).unwrap();
     holds(&ring, 1.0, 2.0, 2.0 * math::hypot(2.0, 0.15));
-    // A repeated single sample: the hole is centred at the far side of the perimeter.
+    // A single sample, repeated: the hole's centre is on the opposite side of the perimeter.
     let one = Wall::new(vec![[5.0, 0.0]; 7], 8.0).unwrap();
     holds(&one, 5.0, 8.0, 10.0);
     assert!(Wall::new(Vec::new(), 8.0).unwrap().largest(0.0, 1.0).is_none());
@@ -247,7 +249,7 @@ fn holes_of_small_sets_match_a_dense_search() {
             .fold(0.0, f64::max);
         let exact = wall.largest(0.0, 0.5).unwrap();
         let short_m = exact.radius_m - dense_m;
-        // The distance to the nearest sample changes by no more than the movement.
+        // The distance to the nearest sample changes by no more than the distance to the nearest grid point.
         assert!((-1e-12..=step_m / math::sqrt(2.0)).contains(&short_m), "{seed}: {exact:?}, {dense_m}");
     }
 }
@@ -266,7 +268,7 @@ fn seam_position_does_not_change_holes() {
     }
 }
 
-/// Samples of one head on a circle with `count` pings a turn and `d_m` of chainage a ping.
+/// Samples of one head on a circle, with `count` pings per turn and a chainage of `d_m` per ping.
 fn helix(radius_m: f64, count: u32, d_m: f64, pings: u32) -> Vec<Ping> {
     let ping = |k: u32| {
         let angle = TAU * f64::from(k % count) / f64::from(count);
@@ -297,7 +299,7 @@ fn helix_spacings_match_the_formulas() {
     let t_x_m = 40.0 * d_m;
     let all = spacings(&pings, TAU * radius_m);
     assert!(all[..40].iter().all(|spacing| spacing.t_x_m == [None, None]));
-    assert_eq!(all[40].t_x_m[0], None, "the first ping of all is an end of its row");
+    assert_eq!(all[40].t_x_m[0], None, "the first ping of the dive is an end point of its series");
     for spacing in &all[41..] {
         for t_x in spacing.t_x_m {
             assert!((t_x.unwrap() - t_x_m).abs() < 1e-12);
@@ -305,7 +307,7 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // A missing return: the next turn has no pass over its two steps, and T_y spans the gap.
+    // After a missing return, the next turn finds no pass over the two steps beside it, and T_y spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

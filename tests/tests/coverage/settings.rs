@@ -1,4 +1,4 @@
-//! Wrong settings are reported with their value within a hundred metres, and correct ones aren't.
+//! Wrong settings are reported with their value within a hundred metres. Correct settings aren't reported.
 
 use headrace_monitor::report::SettingReport;
 use headrace_simulator::Scene;
@@ -10,7 +10,7 @@ fn doubted(scene: &Scene, believed: &Scene) -> Option<SettingReport> {
     report.alerts.iter().find_map(|alert| alert.setting.clone())
 }
 
-/// A vehicle file with one line of one sensor replaced.
+/// A vehicle file with one line replaced in one sensor's table.
 fn changed(file: &str, sensor: &str, key: &str, value: &str) -> String {
     let head = format!("id = {sensor:?}");
     let at = file.find(&head).unwrap();
@@ -34,13 +34,13 @@ const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}
      imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
 
-/// Setting reported in a dive of 100 m by a pilot who wanders slightly. The vehicle is as in `truly`, but headrace
-/// reads `told`.
+/// Setting that is reported in a dive of 100 m by a pilot who wanders slightly. The vehicle is as in `truly`;
+/// headrace reads `told`.
 fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingReport> {
     told_swinging(truly, told, [aside_m, 3.0], seed)
 }
 
-/// As [`told`], by a pilot who yaws by this angle, degrees.
+/// As [`told`], but the pilot yaws by this angle, degrees.
 fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u64) -> Option<SettingReport> {
     let heads: Vec<&str> = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]
         .into_iter()
@@ -57,7 +57,7 @@ fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u6
     doubted(&parse(truly), &parse(told))
 }
 
-/// Vehicle files with one of their heads.
+/// Vehicle files, each with the name of one of its heads.
 const OF_VEHICLES: [(&str, &str); 2] = [("vita1.toml", "sonar_0"), ("vita2-4.toml", "sonar_1")];
 const ASIDE_M: f64 = 0.5;
 
@@ -76,12 +76,12 @@ fn head_turned_about_its_axis_is_reported_with_angle() {
     }
 }
 
-/// It shows in how ranges change as the vehicle yaws back and forth. With a single head it can't be separated from a
-/// heading error.
+/// The error changes the ranges while the vehicle yaws back and forth. With a single head it looks like a heading
+/// error.
 #[test]
 fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {
     let right = file("vita2-4.toml");
-    // The first head looks forward, the other aft.
+    // The first head looks forward, and the other one aft.
     for (head, what, angles, by_deg) in [
         ("sonar_1", "head_yawed", "[0, 0, 3]", 3.0),
         ("sonar_3", "head_yawed", "[0, 0, 177]", -3.0),
@@ -127,7 +127,7 @@ fn cell(vehicle: &str, condition: Condition) -> Cell {
     Cell { vehicle, condition, start_m: 100.0, let_in_m: None, driven: Driven::Planned }
 }
 
-/// Faster sound than configured gives ranges that are too short; a wider wall gives ranges that are too long.
+/// Faster sound than configured gives ranges that are too short. A wider wall gives ranges that are too long.
 #[test]
 fn wrong_range_scale_is_reported_with_its_value() {
     for vehicle in ["vita1", "vita2-4"] {
@@ -160,10 +160,10 @@ fn correct_settings_are_not_reported() {
     }
 }
 
-/// A head that sees a vault about its own axis can't observe its rotation. Without noise its errors of millimetres
-/// are the same all along.
+/// A head that sees only a round vault about its own axis can't observe its rotation. Without noise, its range errors
+/// of some millimetres are constant, and they must not be taken for a wrong setting.
 #[test]
-fn head_in_a_round_sector_is_not_reported_for_millimetres() {
+fn range_errors_of_millimetres_in_a_round_sector_are_not_reported_as_rotation() {
     for layout in ["sector_offset", "phase_shift"] {
         let scene = scenes::scene(&format!(
             "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.layout = {layout:?}\n[trajectory]\nstart_m = 5\n\

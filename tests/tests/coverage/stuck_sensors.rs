@@ -1,4 +1,4 @@
-//! Stuck devices: a head or inertial unit that repeats itself for ever counts as silent.
+//! Stuck devices: a head or inertial unit that repeats its output for ever counts as silent.
 
 use headrace_coverage::Cause;
 use headrace_monitor::messages::Notice;
@@ -10,7 +10,7 @@ const NOISE: &str = "motion_within_turn = {}\nocclusion = {}\nrange_noise = { sd
 const SWAY: &str =
     "pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 12, pitch_deg = 3, period_s = 25 }\n";
 
-/// VITA 2 with four heads is stationary for a minute, then drives this far.
+/// VITA 2 with four heads: stationary for a minute, then a drive of this length.
 fn scene(start_m: f64, way: (f64, f64), effects: &str) -> Scene {
     seeded(5, start_m, way, effects)
 }
@@ -29,7 +29,7 @@ fn hangs(sensor: &str, from_s: f64) -> String {
     format!("device_faults = {{ sensors = [{sensor:?}], kind = \"stick\", from_s = {from_s} }}\n")
 }
 
-/// Truth, ids of sources reported as stuck or without returns, and the speeds advised at the end.
+/// Results of a dive: true holes, causes with their heads, alerts with their texts, and the speed advised at the end.
 struct Told {
     /// True holes of passed sections, m.
     passed_m: Vec<f64>,
@@ -57,7 +57,7 @@ fn dive(scene: &Scene) -> Told {
     }
 }
 
-/// For one second the fault isn't detectable. Its effect on the position stays within the margin of passed sections.
+/// The fault can't be detected within its first second. The margin of passed sections covers its effect in this time.
 #[test]
 fn stuck_inertial_unit_is_reported_and_passes_nothing_over_the_target() {
     let (mut passed, mut over) = (0, 0);
@@ -78,8 +78,8 @@ fn stuck_inertial_unit_is_reported_and_passes_nothing_over_the_target() {
     assert!(100 * over <= passed, "{over} of {passed}");
 }
 
-/// A stuck head repeats one angle and one range, and a head without returns keeps turning. Both get the speed, the
-/// cause and the head name of a silent head.
+/// A stuck head repeats one angle and one range; a head without returns keeps turning. For both, the advised speed,
+/// the cause and the named head are those of a silent head.
 #[test]
 fn head_without_returns_is_reported_as_silent() {
     let deaf = "stuck_range = { range_m = 0.3, from_s = 90, sensors = [\"sonar_1\"] }\n";

@@ -1,4 +1,4 @@
-//! The oracle's holes match those of another program that shares no code with it or with headrace.
+//! The oracle's holes match those of another program, which shares no code with the oracle or with headrace.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +7,7 @@ use headrace_oracle::second;
 use headrace_oracle::wall::{Place, Wall};
 use headrace_tests::{root, skipped};
 
-/// Places from `tests/oracles/holes_truth.csv`, and the wall's perimeter.
+/// Places from `tests/oracles/holes_truth.csv`, and the perimeter of the wall.
 fn committed() -> Wall {
     let text = std::fs::read_to_string(root().join("tests/oracles/holes_truth.csv")).unwrap();
     let (first, rest) = text.split_once('\n').unwrap();

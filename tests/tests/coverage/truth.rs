@@ -16,7 +16,7 @@ fn dive(start_m: f64, effects: &str) -> JudgedDive {
     )))
 }
 
-/// Samples in strips of chainage, for a search that shares nothing with the triangulation.
+/// Samples sorted into strips of chainage, for a search that shares nothing with the triangulation.
 struct Strips<'a> {
     truth: &'a Truth,
     from_m: f64,
@@ -61,7 +61,7 @@ fn true_holes_match_a_fine_grid() {
     let strips = Strips::of(&dive.truth);
     let (along, around) = (5_u32, 720_u32);
     let mut judged = 0;
-    // The ends are far from all samples, so the search would take long there.
+    // The ends are left out: they are far from all samples, so that this search would take long.
     for section in dive.sections.iter().filter(|section| section.true_hole_m < 1.5) {
         let [from_m, to_m] = [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
         let place = |i: u32, j: u32| {
@@ -72,7 +72,7 @@ fn true_holes_match_a_fine_grid() {
         };
         let grid_m = (0..=along).flat_map(|i| (0..around).map(move |j| place(i, j)));
         let grid_m = grid_m.map(|at| 2.0 * strips.clear_m(at)).fold(0.0, f64::max);
-        // The diameter changes by no more than twice the distance to the nearest grid point.
+        // Between grid points, the diameter changes by no more than twice the distance to the nearest grid point.
         let off_m =
             math::hypot((to_m - from_m) / f64::from(along), dive.truth.perimeter_m / f64::from(around));
         let short_m = section.true_hole_m - grid_m;
@@ -95,7 +95,7 @@ fn outline_arc_lengths_match_the_profile() {
     for profile in profiles {
         let outline = Outline::of(&profile);
         for k in 0..5_000 {
-            // Places inside and outside the wall, far apart.
+            // The places are inside and outside the wall, and spread all around it.
             let off_m = 0.3 + 1.5 * math::wrap(0.37 * f64::from(k), 1.0);
             let [y, z] = profile.point_at(0.618 * profile.perimeter_m() * f64::from(k));
             let [y0, z0] = profile.reference();
@@ -107,17 +107,17 @@ fn outline_arc_lengths_match_the_profile() {
     }
 }
 
-/// Whether a section has only samples placed after the estimate settled, and isn't at the dive's end.
+/// Whether a section isn't at the dive's end and has no samples from before the estimate settled.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }
 
-/// As [`settled`], and with a true hole below `hole_m`.
+/// As [`settled`], with a true hole below `hole_m`.
 fn settled_below(section: &truth::JudgedSection, start_m: f64, hole_m: f64) -> bool {
     section.report.start_m > start_m + 1.5 && section.true_hole_m < hole_m
 }
 
-/// Without errors the reported holes are the true ones, wherever the dive begins.
+/// Without errors, reported holes equal true holes, wherever the dive begins.
 #[test]
 fn ideal_dive_reports_true_holes() {
     for start_m in [16.0, 6900.0] {
@@ -133,7 +133,7 @@ fn ideal_dive_reports_true_holes() {
 }
 
 #[test]
-fn returns_from_other_than_wall_fill_no_hole() {
+fn returns_from_anything_except_the_wall_fill_no_hole() {
     let count = |effects: &str| dive(16.0, effects).truth.samples.len() as f64;
     let all = count("motion_within_turn = {}\n");
     for (effect, least, most) in [
@@ -148,7 +148,7 @@ fn returns_from_other_than_wall_fill_no_hole() {
     }
 }
 
-/// A wrong cable count moves sections along the tunnel, and their true stretches with them.
+/// A wrong cable count moves sections along the tunnel, and moves their true stretches by the same distance.
 #[test]
 fn true_stretches_follow_the_cable_error() {
     let effects = "motion_within_turn = {}\ntether_slack = { reach_m = 0.4, period_s = 400 }\n";
@@ -161,8 +161,8 @@ fn true_stretches_follow_the_cable_error() {
     }
 }
 
-/// Heads with a least range of 10 cm also hear their own vehicle, which hides a part of the wall. Its echoes fill no
-/// hole.
+/// Heads with a minimum range of 10 cm receive echoes of their own vehicle, which hides a part of the wall. These
+/// echoes fill no hole.
 #[test]
 fn echoes_of_the_vehicle_pass_no_section() {
     let load = |name: &str| {

@@ -1,11 +1,12 @@
-//! Places visited several times: what a later visit adds, what it can't revoke, and how two visits combine.
+//! Places with several visits. A later visit can add to the coverage but never revokes a pass, and two visits
+//! combine.
 
 use headrace_tests::{scenes, truth};
 
 const SENSORS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.0006, attitude_deg = 0.2 }\n\
     imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.0003, tau_s = 300 }\nrange_noise = { sd_m = 0.01 }\n";
 
-/// A dive of `vita2-4` from 5 m over these legs (m, m/s); negative distances go backwards.
+/// A dive of `vita2-4` from 5 m along these legs (m, m/s). A negative distance means backward motion.
 fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
     let leg = |(by_m, speed_mps): &(f64, f64)| {
         format!("[[trajectory.legs]]\ndistance_m = {by_m}\nspeed_mps = {speed_mps}\n")
@@ -18,15 +19,15 @@ fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
     truth::dive(&scenes::seeded(&text, &vehicle, Some(seed)))
 }
 
-/// A vehicle file whose cable slack may wander by 6 cm within minutes. That is little between passes and much between
-/// visits.
+/// A vehicle file in which the cable slack may change by 6 cm within minutes. Between neighbouring passes this change
+/// is small, but between visits it is large.
 fn vehicle(name: &str) -> Result<Vec<u8>, String> {
     let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
     let file = file.replace("slack_sd_m = 0.02", "slack_sd_m = 0.06");
     Ok(file.replace("slack_time_s = 10", "slack_time_s = 60").into_bytes())
 }
 
-/// Starts of the sections between two chainages with this verdict, m.
+/// Start chainages of the sections with this verdict between two chainages, m.
 fn with_verdict(dive: &truth::JudgedDive, verdict: &str, [from_m, to_m]: [f64; 2]) -> Vec<String> {
     let within = dive.sections.iter().map(|section| &section.report);
     let within = within.filter(|section| section.start_m >= from_m && section.end_m <= to_m);
@@ -41,12 +42,12 @@ fn far_over(dive: &truth::JudgedDive, target_m: f64) -> usize {
     passed.filter(|section| section.true_hole_m > 1.1 * target_m).count()
 }
 
-/// The counter is stuck for 12 s while the vehicle moves on.
+/// The counter is stuck for 12 s while the vehicle continues to move.
 const STUCK: &str =
     "[[effects.device_faults]]\nsensors = [\"tether\"]\nkind = \"stick\"\nfrom_s = 60\nfor_s = 12\n";
 
 #[test]
-fn sections_sampled_across_a_position_doubt_pass_after_one_complete_visit() {
+fn one_complete_visit_passes_sections_sampled_during_a_position_doubt() {
     let out = dive(4, &[(12.0, 0.09)], STUCK);
     let back = dive(4, &[(12.0, 0.09), (9.0, -0.09)], STUCK);
     let where_m = [8.0, 13.0];
@@ -54,12 +55,12 @@ fn sections_sampled_across_a_position_doubt_pass_after_one_complete_visit() {
     assert!(unsure.len() >= 2, "nothing was in doubt: {:?}", out.report.alerts);
     let passed = with_verdict(&back, "pass", where_m);
     let still: Vec<_> = unsure.iter().filter(|start| !passed.contains(start)).collect();
-    assert!(still.is_empty(), "of {unsure:?} still not passed: {still:?}");
+    assert!(still.is_empty(), "undecided: {unsure:?}; still not passed: {still:?}");
     assert_eq!(far_over(&back, 0.5), 0);
 }
 
 #[test]
-fn way_home_revokes_no_pass() {
+fn drive_back_revokes_no_pass() {
     let out = dive(2, &[(12.0, 0.09)], "");
     let home = dive(2, &[(12.0, 0.09), (12.0, -0.4)], "");
     let where_m = [6.0, 15.0];
@@ -69,9 +70,9 @@ fn way_home_revokes_no_pass() {
     assert!(lost.is_empty(), "{lost:?}");
 }
 
-/// Each of two visits is too fast, and the cable's slack differs on the way back.
+/// The vehicle is too fast on both visits, and the slack of the cable differs between them.
 #[test]
-fn two_visits_combine_only_their_own_samples() {
+fn two_visits_with_different_slack_pass_no_section_far_over_the_target() {
     let (mut over, mut wrong, mut passed) = (0, 0, 0);
     for seed in 0..10 {
         let dive =

@@ -1,4 +1,4 @@
-//! Only returns accepted as wall fill holes, compared with what the beams truly met.
+//! Only returns that are accepted as wall fill holes. They are compared with the objects that the beams truly met.
 //!
 //! Cases are stuck and noisy heads, murk, boulders and caves.
 
@@ -18,7 +18,7 @@ const CREEP: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[tr
     speed_mps = 0.03\n[effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.005 }\n";
 const DRIFT: &str = "pilot_drift = { across_m = 0.2, up_m = 0.1, yaw_deg = 6, period_s = 15 }\n";
 
-/// A vehicle with this many heads, alternating front and aft, in a pipe of 1 m radius.
+/// A vehicle in a pipe of 1 m radius. It has this many heads, which alternately look forward and aft.
 fn pipe(heads: usize) -> String {
     let mut text = "target_m = 0.25\n[tunnel]\nprofile = \"circle\"\nradius_m = 1\nlength_m = 30\n[water]\n\
         sound_speed_mps = 1447\n[navigation]\nslack_time_s = 10\n[heads]\nplanned_speed_mps = 0.03\n"
@@ -40,12 +40,13 @@ fn dive(heads: usize, effects: &str) -> Dive {
     instrumented::dive(&pipe(heads), &format!("{CREEP}{effects}"))
 }
 
-/// Alerts that state why a head isn't trusted.
+/// Alerts about a head that isn't trusted.
 fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a AlertReport> {
     dive.report.alerts.iter().filter(|alert| alert.head.as_deref() == Some(head)).collect()
 }
 
-/// Range error of each ping against what its beam met, m, in the loop's order; `None` if either is missing.
+/// Difference between the range of each ping and the true range of the object that its beam met, m. The order is that
+/// of the loop; `None` if one of the two ranges is missing.
 fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
     let scene = scenes::scene_from(scene, &|_| Ok(vehicle.as_bytes().to_vec()));
     let mut simulation = Simulation::with_truth(&scene).unwrap();
@@ -62,21 +63,21 @@ fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
     dive.pings.iter().map(|ping| heads[ping.head].next().unwrap()).collect()
 }
 
-/// Returns and sections of a dive in murk, compared with what the beams truly met.
+/// Returns and sections of a dive in murk, compared with the objects that the beams truly met.
 #[derive(Debug, Default)]
 struct Compared {
-    /// Returns that met the wall, and how many of them were called doubtful.
+    /// Number of returns from the wall, and number of these that the loop classified as doubtful.
     met: usize,
     met_doubtful: usize,
-    /// Returns that met something else, and how many of them were accepted as wall.
+    /// Number of returns from other objects, and number of these that the loop accepted as wall.
     strays: usize,
     strays_wall: usize,
-    /// Sections that passed, and their largest true hole over the target.
+    /// Number of passed sections, and their largest ratio of true hole to target.
     passed: usize,
     worst: f64,
 }
 
-/// Compares a dive; a return has met the wall if its range error is at most `near_m`.
+/// Compares a dive with the truth. A return comes from the wall if its range error is at most `near_m`.
 fn compared(vehicle: &str, scene: &str, near_m: f64) -> Compared {
     let dive = instrumented::dive(vehicle, scene);
     let errors_m = errors_m(vehicle, scene, &dive);
@@ -107,7 +108,7 @@ fn head_stuck_at_one_range_passes_nothing() {
     assert!(sound.report.summary.pass_m > 5.0, "{:?}", sound.report.summary);
     let alone = dive(1, "stuck_range = { sensors = [\"sonar_0\"] }\n");
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
-    // At the centre of a round pipe a constant range may be the wall of another pipe.
+    // A constant range at the centre of a round pipe could be the wall of a pipe with another radius.
     let kinds: Vec<_> = alone.report.alerts.iter().map(|alert| alert.kind).collect();
     assert_eq!(kinds, ["profile_contradicted"]);
 }
@@ -125,7 +126,7 @@ fn one_stuck_head_of_several_is_reported_and_the_others_count() {
         assert!((-0.5..-0.4).contains(&alerts[0].worst_m), "{at}");
         assert!(dive.report.alerts.iter().all(|alert| alert.head.as_deref().is_none_or(|head| head == id)));
         assert!(dive.report.summary.pass_m >= least_m, "{at}");
-        // No section passes because of its returns.
+        // The stuck head's returns pass no section.
         let others = dive.samples_of(|head| head != stuck);
         let wall = Wall::new(others, dive.profile.perimeter_m()).unwrap();
         for section in dive.report.sections.iter().filter(|section| section.verdict == "pass") {
@@ -146,7 +147,7 @@ fn recovered_head_counts_again() {
         .map(|ping| ping.received.since(dive.pings[0].received).as_secs_f64())
         .collect();
     assert!(doubtful.len() > 2000 && doubtful[0] > 58.0, "{} from {}", doubtful.len(), doubtful[0]);
-    // The vote on a head needs some turns of new wall.
+    // The loop accepts the head again after some turns over new wall.
     assert!(doubtful.last().unwrap() < &145.0, "{:?}", doubtful.last());
 }
 
@@ -167,7 +168,7 @@ fn noise_passes_nothing_and_one_noisy_head_of_two_is_reported() {
     assert_eq!(named(&alone, "sonar_0")[0].kind, "head_scattered");
     let causes = alone.report.sections.iter().filter_map(|section| section.cause);
     let causes: Vec<&str> = causes.map(|evidence| evidence.cause.as_str()).collect();
-    // A head whose returns are all rejected counts as silent.
+    // A head counts as silent if all of its returns are rejected.
     let silent = causes.iter().filter(|cause| **cause == "head_silent").count();
     assert!(causes.len() > 10 && 10 * silent >= 9 * causes.len(), "{causes:?}");
     let one_of_two = dive(2, &effects("sonar_1"));
@@ -230,7 +231,7 @@ fn caves_heaps_boulders_traps_and_side_tunnels_count_as_wall() {
         assert!(dive.report.alerts.iter().all(|alert| alert.head.is_none()), "{:?}", dive.report.alerts);
         let told = dive.report.dive.samples_rejected.doubtful_returns;
         assert_eq!(usize::try_from(told).unwrap(), doubtful);
-        // No section fails because they are missing.
+        // No section fails because doubtful returns are missing.
         let all =
             dive.pings.iter().filter_map(|ping| ping.sample.or(ping.doubtful)).map(|sample| sample.place);
         let wall = Wall::new(all, dive.profile.perimeter_m()).unwrap();

@@ -1,4 +1,4 @@
-//! Intact files of each kind: small headrace logs, and fixtures of foreign formats.
+//! Intact files of each kind: small headrace logs, and files in foreign formats.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -19,10 +19,10 @@ use crate::mutate::broken;
 /// Start time of the logs.
 const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// Number of the second vehicle's first sensor.
+/// Number of the first sensor that belongs to the second vehicle.
 pub(crate) const OTHERS: u8 = 128;
 
-/// Kind of a file, which decides its reader.
+/// Kind of a file; it determines the reader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
     Log,
@@ -35,7 +35,7 @@ pub(crate) enum Kind {
     Mcap,
     Vehicle,
     Scene,
-    /// Bytes of a device: sensor number, seed of the split into pieces, and the bytes.
+    /// Data of a device: sensor number, random seed for the split into pieces, and the device's bytes.
     Line,
     /// A packet of operator input.
     Console,
@@ -76,7 +76,8 @@ pub(crate) struct File {
 
 pub(crate) struct Corpus {
     pub(crate) files: Vec<File>,
-    /// Messages of all intact logs. A broken log must contain those of its original, or report the loss.
+    /// Messages of all intact logs. The messages of an intact log must all be found in its broken version, unless a
+    /// loss is reported.
     pub(crate) said: Vec<Said>,
 }
 
@@ -84,7 +85,8 @@ impl Corpus {
     pub(crate) fn new() -> Self {
         let mut files = Vec::new();
         let mut add = |kind, bytes| files.push(File { kind, bytes });
-        // Headrace logs are three times as frequent as foreign files, since they must never lose data silently.
+        // Headrace logs are three times as frequent as foreign files, because headrace logs must never lose data
+        // silently.
         for messages in [12, 60] {
             add(Kind::Log, ours(messages));
             add(
@@ -185,7 +187,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// Unique content of varying length.
+/// Content that is unique for each number and varies in length.
 fn content(number: u64) -> Vec<u8> {
     let mut random = Random(number);
     (0..=number % 40).map(|_| random.bits().to_le_bytes()[3]).collect()
@@ -196,7 +198,7 @@ fn ours(messages: u64) -> Vec<u8> {
     let header = LogHeader { sources: vec![source("depth"), source("imu")], ..LogHeader::default() };
     let mut log = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
     for number in 0..messages {
-        // Several chunks of at most half a second.
+        // The log has several chunks of half a second at most.
         let at = BEGIN + DurNs::from_millis(i64::try_from(number * 40).unwrap());
         log.raw(u16::try_from(number % 2).unwrap(), at, at, &content(number)).unwrap();
     }
@@ -221,7 +223,7 @@ fn foreign(messages: u64, set: impl FnOnce(WriteOptions) -> WriteOptions) -> Vec
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    // The last field isn't zero, so that all 28 bytes are sent.
+    // The last field isn't zero, because MAVLink drops trailing zeros and all 28 bytes must be sent.
     let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
     frame.raw_bytes().to_vec()

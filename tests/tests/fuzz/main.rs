@@ -1,8 +1,8 @@
 //! Randomly broken files: no reader may panic, hang, exceed its memory bound, or lose data of a dive log silently.
 //!
-//! Readers cover dive logs, foreign logs, files written by people, lines of devices, commands and viewers' messages.
-//! `cargo test -p headrace_tests --test fuzz` tries a few files, always the same. `.ci/run` runs for a minute from a
-//! new seed:
+//! The tested readers are those of dive logs, foreign logs, files written by people, device data, commands and
+//! viewers' messages. `cargo test -p headrace_tests --test fuzz` tries a few files, which are the same in every run.
+//! `.ci/run` runs for a minute from a new seed:
 //!
 //!     HEADRACE_FUZZ_SECONDS=600 cargo test -p headrace_tests --test fuzz -- --ignored --nocapture
 //!     HEADRACE_FUZZ_SEED=42 HEADRACE_FUZZ_SECONDS=60 cargo test -p headrace_tests --test fuzz -- --ignored --nocapture
@@ -35,9 +35,9 @@ use headrace_tests::random::Random;
 use corpus::{Corpus, Kind};
 use targets::{Surroundings, try_one};
 
-/// Largest memory for one file, whatever it claims, bytes (`docs/reference/limits.md`).
+/// Largest memory for one file, whichever sizes the file claims, bytes (`docs/reference/limits.md`).
 const MOST_MEMORY: usize = 200 << 20;
-/// Longest time for one file; a hundredth of it is much already.
+/// Longest time for one file. Files usually take less than a hundredth of this time.
 const LONGEST: DurNs = DurNs::from_millis(20_000);
 /// Number of files in an ordinary test run.
 const FEW: u64 = 1500;
@@ -95,7 +95,7 @@ impl Trial {
         format!("seed {seed}, file {number} ({}): {problem}; kept as {kept}", kind.name())
     }
 
-    /// Tries one file.
+    /// Tries one file and describes a failure.
     fn of(&self, bytes: &[u8], corpus: &Corpus, around: &Surroundings) -> Result<(), String> {
         let before = HELD.load(Ordering::Relaxed);
         MOST_HELD.store(before, Ordering::Relaxed);
@@ -117,7 +117,7 @@ impl Trial {
     }
 }
 
-/// Ends the program if a file takes too long, because a hanging reader can't be stopped otherwise.
+/// Ends the program if a file takes too long, because nothing else can stop a hanging reader.
 fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
     static NUMBER: AtomicUsize = AtomicUsize::new(0);
     let done = AtomicBool::new(false);
@@ -135,7 +135,7 @@ fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
                 }
             }
         });
-        // A file that hangs can't be kept afterwards.
+        // Every file is kept before it is tried, because a file that hangs can't be kept afterwards.
         let result = work(&|trial, bytes| {
             NUMBER.fetch_add(1, Ordering::Relaxed);
             let name = format!("headrace-fuzz-last-{}.{}", std::process::id(), trial.kind.name());
@@ -148,7 +148,7 @@ fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
     })
 }
 
-/// Tries files from a seed until `enough` returns true for their number.
+/// Tries files from a seed on until `enough` returns true for the number of tried files.
 fn fuzz(seed: u64, enough: impl Fn(u64) -> bool) -> Vec<String> {
     let corpus = Corpus::new();
     let around = Surroundings::new();
@@ -183,21 +183,21 @@ fn intact_files_have_no_findings() {
         assert_eq!(trial.of(&file.bytes, &corpus, &around), Ok(()));
         assert!(
             targets::gives(file.kind, &file.bytes, &around) > 0,
-            "{:?} {number} gives nothing",
+            "{:?} {number}: the reader gets nothing",
             file.kind
         );
     }
 }
 
 #[test]
-fn few_broken_files_are_handled() {
+fn broken_files_cause_no_panic_hang_or_silent_loss() {
     let problems = fuzz(SEED_OF_FEW, |tried| tried >= FEW);
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 
 #[test]
 #[ignore = "takes a minute; .ci/run has it"]
-fn minute_of_broken_files_is_handled() {
+fn minute_of_broken_files_causes_no_panic_hang_or_silent_loss() {
     let seconds = number("HEADRACE_FUZZ_SECONDS").unwrap_or(60);
     let seed = number("HEADRACE_FUZZ_SEED").unwrap_or_else(|| now().0 ^ u64::from(std::process::id()) << 40);
     println!("HEADRACE_FUZZ_SEED={seed}");

@@ -5,10 +5,10 @@ use std::io::Cursor;
 
 use headrace_replay::log::{LogReader, MessageKind};
 
-/// Messages of a log by time and content, with their number.
+/// Messages of a log by time and content, and how often each one occurs.
 pub(crate) type Said = BTreeMap<(u64, Vec<u8>), u32>;
 
-/// Reads a log; returns its messages, and whether it reports no loss. Errors: it isn't a log.
+/// Reads a log. Returns its messages, and whether the log is reported as complete. Errors: the file isn't a log.
 pub(crate) fn said(bytes: &[u8]) -> Result<(Said, bool), String> {
     let mut log =
         LogReader::new(Cursor::new(bytes.to_vec()), "log".to_owned()).map_err(|error| error.to_string())?;

@@ -2,7 +2,7 @@
 
 use headrace_tests::random::Random;
 
-/// A random part of `len` bytes, more often short than long.
+/// A random range within `len` bytes. Short ranges are more frequent than long ones.
 fn part(random: &mut Random, len: usize) -> core::ops::Range<usize> {
     let start = random.below(len);
     let most = match random.below(3) {
@@ -70,8 +70,8 @@ fn once(random: &mut Random, bytes: &mut Vec<u8>, other: &[u8]) {
     }
 }
 
-/// Replaces a number of four or eight bytes, in either byte order. Small numbers are preferred, since they are more
-/// likely lengths.
+/// Replaces a number of four or eight bytes in either byte order. Prefers small numbers, because these are often
+/// lengths.
 fn lengths(random: &mut Random, bytes: &mut [u8], at: usize) {
     let width = if random.below(2) == 0 { 4 } else { 8 };
     let big_endian = random.below(4) == 0;

@@ -1,4 +1,4 @@
-//! Readers of files, and the conditions that they must satisfy.
+//! Readers of files, and the conditions that every reader must satisfy.
 
 use std::io::Cursor;
 
@@ -31,7 +31,7 @@ use crate::messages::{Said, said};
 /// Vehicles and mappings that the readers need.
 pub(crate) struct Surroundings {
     vehicle: VehicleConfig,
-    /// Vehicles whose devices send lines; the second one's sensors begin at `OTHERS`.
+    /// Vehicles with devices that send data. The sensor numbers of the second vehicle begin at `OTHERS`.
     vehicles: [VehicleConfig; 2],
 }
 
@@ -89,7 +89,8 @@ impl Surroundings {
         Self { vehicle: read(VEHICLE), vehicles }
     }
 
-    /// Takers for every sensor: each listens to the line of this name, and to one named like itself.
+    /// Takers for every sensor. In tables and ROS recordings a taker reads the stream with its sensor's name, and in
+    /// other files the only stream.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {
             Kind::Tlog => tlog::STREAM,
@@ -110,7 +111,7 @@ impl Surroundings {
             .collect()
     }
 
-    /// Feeds by a mapping of the given topics; stamps are used in half of them.
+    /// Feeds from a mapping of the given topics. Only the topics of profiling heads use stamps.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
         let text = there.fold(String::new(), |text, (topic, sensor)| {
@@ -122,9 +123,9 @@ impl Surroundings {
     }
 }
 
-/// Tries a file of any content.
+/// Tries a file with any content.
 ///
-/// Errors: a description of what is wrong with how it was read.
+/// Errors: a description of the fault that the reader showed.
 pub(crate) fn try_one(
     kind: Kind,
     bytes: &[u8],
@@ -149,7 +150,7 @@ pub(crate) fn try_one(
     if !silent || !is_vouched_for(bytes) {
         return Ok(());
     }
-    // Parts of other logs may have been inserted, but the messages of one log must be complete.
+    // The broken file may also contain parts of other logs, but it must contain all messages of one intact log.
     let holds =
         |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
     if corpus.said.iter().any(holds) {
@@ -159,7 +160,7 @@ pub(crate) fn try_one(
     }
 }
 
-/// Whether every checksum is present. A checksum of zero means none, and then a changed byte can't be detected.
+/// Whether every checksum is present. A checksum of zero is a missing one, so a changed byte can't be detected.
 fn is_vouched_for(log: &[u8]) -> bool {
     let mut rest = &log[8..];
     while let Some((head, behind)) = rest.split_first_chunk::<9>() {
@@ -181,7 +182,7 @@ fn is_vouched_for(log: &[u8]) -> bool {
     true
 }
 
-/// Number of items that a file yields.
+/// Number of items that the reader gets from a file.
 pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     match kind {
         Kind::Log => said(bytes).unwrap().0.len() as u64,
@@ -193,8 +194,9 @@ pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     }
 }
 
-/// Decodes bytes of a device whole and in pieces; returns the number of readings. Errors: a reading that is no
-/// number, counts that don't add up, or readings that depend on the pieces.
+/// Decodes a device's bytes both whole and in pieces; returns the number of readings.
+///
+/// Errors: a reading isn't a finite number, the counts don't add up, or the readings depend on the pieces.
 fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     let &[number, seed, ref line @ ..] = bytes else { return Ok(0) };
     let [first, second] = &around.vehicles;
@@ -206,7 +208,7 @@ fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     let mut said = Ok(());
     while !rest.is_empty() {
         let (now, later) = rest.split_at((1 + random.below(24)).min(rest.len()));
-        // Mostly at once, sometimes after a silence, or with an earlier timestamp.
+        // The next piece usually follows at once, but sometimes after a silence or with an earlier timestamp.
         at = match random.below(40) {
             0 => at + DurNs::from_millis(3_600_000),
             1 => MonoNs(at.0.saturating_sub(1_000_000_000)),
@@ -227,7 +229,7 @@ fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     said.map(|()| count)
 }
 
-/// Reads a packet of operator input. Errors: it isn't identical when written again.
+/// Reads a packet of operator input. Errors: the command changes when it is written and read again.
 fn command(bytes: &[u8]) -> Result<u64, String> {
     let Ok(command) = console::Command::parse(bytes) else { return Ok(0) };
     let json = command.to_json();
@@ -237,7 +239,7 @@ fn command(bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Reads a viewer's message. Errors: it is accepted but the loop's input has no command for it.
+/// Reads a viewer's message. Errors: the message is accepted, but the loop's input has no such command.
 fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
     let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
     match headrace_dashboard::command::command_of(text) {
@@ -252,10 +254,10 @@ fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Most errors listed for a file, with the line that states that there are more.
+/// Largest number of errors listed for a file. It includes the line that says that there are more.
 const MOST_ERRORS: usize = 101;
 
-/// Reads a vehicle file or a scene; returns its number of sensors. Errors: a fault in how its errors are listed.
+/// Reads a vehicle file or a scene; returns its number of sensors. Errors: the list of errors in the file is faulty.
 fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
     let document = Document::new("file", text);
@@ -279,10 +281,10 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Imports a file into a log, which must be intact.
+/// Imports a file into a log, and checks that the log is intact.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        // Other kinds aren't imported.
+        // No importer reads these kinds, except ROS recordings, so all of them are tried as such.
         Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());
@@ -304,7 +306,7 @@ fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     written(kind, Input::new("file", Cursor::new(bytes.to_vec()), format), around)
 }
 
-/// A table of an inertial unit and a depth sensor, or of a head.
+/// A table of pressure and cable chainage, or of a head.
 fn table(bytes: &[u8], around: &Surroundings) -> Option<Csv> {
     let columns = |columns: &[[&str; 4]]| {
         let head = "time_column = \"t\"\nutc = true\n".to_owned();

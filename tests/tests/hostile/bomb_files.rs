@@ -1,4 +1,4 @@
-//! Text files and foreign logs that never end or are far larger than such files should be.
+//! Text files and foreign logs that never end, or that are far larger than is sensible.
 
 use std::fmt::Write as _;
 
@@ -15,7 +15,7 @@ fn many(count: usize, line: impl Fn(usize) -> String) -> String {
     })
 }
 
-/// The vehicle with a profile from a file.
+/// The vehicle file with a profile in another file.
 fn with_profile(file: &str) -> String {
     let tunnel = format!("profile = \"polyline\"\nfile = \"{file}\"\n");
     let vehicle = VEHICLE.replace("profile = \"circle\"\nradius_m = 3\n", &tunnel);
@@ -23,10 +23,10 @@ fn with_profile(file: &str) -> String {
     vehicle
 }
 
-/// A file name with content, the command, and the expected message.
+/// A file as name and content, the command that reads it, and the expected message.
 type Bomb = (&'static str, String, &'static [&'static str], &'static str);
 
-/// All of them.
+/// All oversized files.
 #[expect(clippy::too_many_lines, reason = "a table")]
 fn files() -> Vec<Bomb> {
     let check: &[&str] = &["check", "file"];
@@ -194,7 +194,7 @@ fn oversized_files_are_refused_with_the_limit() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Lists of one-letter names take the most memory per byte.
+/// Lists of names with one letter need the most memory per byte.
 #[test]
 fn dbc_files_of_any_length_stay_within_the_memory_limit() {
     let folder = Folder::new();

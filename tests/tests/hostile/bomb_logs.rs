@@ -1,4 +1,4 @@
-//! Logs that claim, or unpack to, far more than their size.
+//! Logs whose claimed or unpacked size is far larger than the file.
 
 use crate::records::{
     Part, attachment, channel, chunk, ended, log, map, message, message_head, metadata, packed_chunk, record,
@@ -9,7 +9,7 @@ use crate::records::{
 pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
-    /// Part of a loss that a replay must report; the log is damaged.
+    /// Words that a replay must report as a loss, because the log is damaged.
     pub(crate) told: &'static str,
 }
 
@@ -27,13 +27,13 @@ fn numbered(count: u32) -> impl Iterator<Item = (String, String)> {
     (0..count).map(|number| (format!("{number:x}"), String::new()))
 }
 
-/// A record of `len` bytes: `front`, then one repeated byte.
+/// A record of `len` bytes, which consists of `front` and one repeated byte.
 fn filled<'a>(head: &'a mut Vec<u8>, opcode: u8, front: &[u8], len: u64) -> [Part<'a>; 2] {
     *head = [record_head(opcode, len), front.to_vec()].concat();
     [Part::Bytes(head), Part::Repeated(b'a', len - front.len() as u64)]
 }
 
-/// Bombs in chunks: sizes after unpacking.
+/// Bombs inside chunks, with their sizes after unpacking.
 fn chunks() -> Vec<Bomb> {
     let bomb = |name, records: &[Vec<u8>], told| Bomb { name, bytes: log(records), told };
     let zeros = |len| packed_chunk(&[Part::Repeated(0, len)], (1, 2));
@@ -106,7 +106,7 @@ fn chunks() -> Vec<Bomb> {
     ]
 }
 
-/// Bombs in records around chunks.
+/// Bombs in records outside of chunks.
 fn headers() -> Vec<Bomb> {
     let bomb = |name, records: &[Vec<u8>], told| Bomb { name, bytes: log(records), told };
     let channels = |topic: &str, metadata: &[u8]| -> Vec<u8> {
@@ -182,7 +182,7 @@ fn headers() -> Vec<Bomb> {
     ]
 }
 
-/// Bombs of offsets and sizes that point elsewhere.
+/// Bombs with wrong offsets and sizes.
 fn pointers() -> Vec<Bomb> {
     let some = |records: &[Vec<u8>]| log(&[&[depth()], records, &[message(1, 5, b"a")]].concat());
     let index = |count: u32| record(7, &[&[1, 0][..], &count.to_le_bytes(), &[0; 64]].concat());
@@ -232,7 +232,7 @@ fn pointers() -> Vec<Bomb> {
     ]
 }
 
-/// All of them.
+/// All bomb logs.
 pub(crate) fn all() -> Vec<Bomb> {
     [chunks(), headers(), pointers()].into_iter().flatten().collect()
 }

@@ -1,6 +1,6 @@
-//! Bombs: files that claim, or unpack to, far more than their size.
+//! Bombs: files whose claimed or unpacked size is far larger than the file.
 //!
-//! Every command that reads one ends, takes less than 200 MiB, and reports what it skipped.
+//! Every command that reads a bomb ends, takes less than 200 MiB, and reports the skipped parts.
 
 use std::io::{Cursor, Read, Result, Seek, SeekFrom};
 
@@ -38,7 +38,7 @@ fn log_bombs_take_little_memory_and_are_reported() {
         }
         for ran in [replayed, recovered] {
             let is_told = told.split('|').any(|words| ran.stdout.contains(words));
-            // Records that aren't packets are lost to a dive only.
+            // Lost records that aren't packets don't affect a replay.
             if (ran.code, is_told) != (Some(3), true) && !(told.contains("over 4096") && ran.code == Some(0))
             {
                 let start: String = ran.stdout.chars().take(400).collect();
@@ -49,7 +49,7 @@ fn log_bombs_take_little_memory_and_are_reported() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// A log in memory that counts the bytes read.
+/// A log in memory. It counts the bytes that are read from it.
 struct Counted<'a> {
     log: Cursor<&'a [u8]>,
     read: u64,
@@ -82,7 +82,7 @@ fn bytes_read_of_a_bomb_are_proportional_to_its_length() {
         drop(log);
         let len = bytes.len() as u64;
         println!("{name}: {len} bytes, {} read, {messages} messages", counted.read);
-        // Frames are read in steps of the reader's buffer, which is refilled after each seek.
+        // The limit allows for the reader's buffer, which is filled again after each seek.
         assert!(counted.read <= (1 << 20) + 16 * len, "{name}: {} of {len}", counted.read);
         assert!(messages <= len / 31 + 100, "{name}: {messages} of {len} bytes");
     }

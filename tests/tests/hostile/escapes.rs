@@ -1,4 +1,5 @@
-//! Names from outside may contain terminal control codes. They are shown escaped, and each line stays a single line.
+//! Names from outside the program may contain terminal control codes. They are displayed escaped, each on a single
+//! line.
 
 use headrace_tests::{Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -6,8 +7,8 @@ use mcap::WriteOptions;
 use crate::records::{attachment, channel, log, message, metadata};
 use crate::run::run;
 
-/// Control codes in C1 and C0: clear screen, window title, bell, carriage return, text direction, and a line of its
-/// own.
+/// Control codes in C0 and C1. They clear the screen, set the window title, ring the bell, return the carriage,
+/// change the text direction, and begin a new line.
 const EVIL: &str = "a\x1b[2J\x1b]0;t\x07\rb\u{9b}31m\u{202e}c\u{2066}\ndigest 0000000000000000";
 
 #[track_caller]
@@ -90,7 +91,7 @@ fn control_codes_in_file_names_and_contents_are_escaped() {
         is_plain(&format!("{arguments:?}"), &ran.stdout);
         is_plain(&format!("{arguments:?}"), &ran.log);
     }
-    // A name in a vehicle file may not contain them.
+    // Names in a vehicle file may not contain control codes.
     folder.write("evil.toml", &vehicle);
     let ran = run(&folder, &["check", "evil.toml"]);
     assert_eq!(ran.code, Some(2));

@@ -41,39 +41,39 @@ pub(crate) fn metadata(name: &str, entries: impl Iterator<Item = (String, String
     record(12, &[text(name), map(entries)].concat())
 }
 
-/// An attachment without checksum; its data has the stated length.
+/// An attachment without a checksum. It states the true length of its data.
 pub(crate) fn attachment(name: &str, data: &[u8]) -> Vec<u8> {
     let head = [&[0; 16][..], &text(name), &text(""), &(data.len() as u64).to_le_bytes()].concat();
     record(9, &[&head, data, &[0; 4]].concat())
 }
 
-/// A chunk that states this unpacked size, with messages between two times.
+/// A chunk that states the unpacked size `unpacked`. The times of its messages lie within `times`.
 pub(crate) fn chunk(packing: &str, unpacked: u64, packed: &[u8], times: (u64, u64)) -> Vec<u8> {
     let numbers = [times.0, times.1, unpacked].map(u64::to_le_bytes).concat();
     let len = (packed.len() as u64).to_le_bytes();
     record(6, &[&numbers, &[0; 4][..], &text(packing), &len, packed].concat())
 }
 
-/// A log of these records, with an end.
+/// A complete log that contains these records.
 pub(crate) fn log(records: &[Vec<u8>]) -> Vec<u8> {
     ended(records, 0)
 }
 
-/// As [`log`], with a footer that states where the summary begins.
+/// As [`log`], with a footer that gives the start of the summary.
 pub(crate) fn ended(records: &[Vec<u8>], summary: u64) -> Vec<u8> {
     let header = record(1, &[text(""), text("by hand")].concat());
     let footer = record(2, &[&summary.to_le_bytes()[..], &[0; 12]].concat());
     [MAGIC, &header, &records.concat(), &record(15, &[0; 4]), &footer, MAGIC].concat()
 }
 
-/// A part of the data that a frame unpacks to.
+/// A part of the data after unpacking a frame.
 pub(crate) enum Part<'a> {
     Bytes(&'a [u8]),
-    /// One byte, repeated this often.
+    /// One byte and its number of repetitions.
     Repeated(u8, u64),
 }
 
-/// A frame of zstd with a window of 2^`window_log` bytes, 10 to 41.
+/// A zstd frame with a window of 2^`window_log` bytes; `window_log` is 10 to 41.
 pub(crate) fn zstd(window_log: u8, parts: &[Part<'_>]) -> Vec<u8> {
     let mut frame = vec![0x28, 0xB5, 0x2F, 0xFD, 0, (window_log - 10) << 3];
     let most = 1_u64 << window_log.min(17);
@@ -107,7 +107,7 @@ pub(crate) fn packed_chunk(parts: &[Part<'_>], times: (u64, u64)) -> Vec<u8> {
     chunk("zstd", lengths.sum(), &zstd(17, parts), times)
 }
 
-/// Header of a record; the content of this length follows later.
+/// Header of a record with `len` bytes of content, which follow separately.
 pub(crate) fn record_head(opcode: u8, len: u64) -> Vec<u8> {
     [&[opcode], len.to_le_bytes().as_slice()].concat()
 }

@@ -7,24 +7,24 @@ use headrace_geometry::time::DurNs;
 use headrace_ports::now;
 use headrace_tests::{Folder, program};
 
-/// Runs here take seconds; a run that takes longer than this never ends.
+/// A run that takes longer never ends: runs usually take seconds.
 const HANGS_AFTER: DurNs = DurNs::from_millis(120_000);
 
 /// Result of a run.
 pub(crate) struct Ran {
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
-    /// Lines of stderr without log messages.
+    /// Lines of stderr, except log messages.
     pub(crate) stderr: String,
     /// All of stderr.
     pub(crate) log: String,
     /// Peak resident memory, MiB.
     pub(crate) most_mib: u64,
-    /// Duration, s; printed in tables but never judged.
+    /// Duration, s; tables print it, but no test judges it.
     pub(crate) took_s: f64,
 }
 
-/// Runs the program in a folder and measures its memory; it must end by itself.
+/// Runs the program in a folder and measures the program's memory. The program must end by itself.
 #[track_caller]
 pub(crate) fn run(folder: &Folder, arguments: &[&str]) -> Ran {
     let files = ["out", "err"].map(|name| folder.path(name));

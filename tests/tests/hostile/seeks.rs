@@ -1,4 +1,4 @@
-//! Seeks in odd logs: data after a position must not be known at that position.
+//! Seeks in odd logs. Definitions that come after a position must be unknown at that position.
 
 use std::io::Cursor;
 
@@ -6,7 +6,7 @@ use headrace_replay::log::LogReader;
 
 use crate::records::{MAGIC, channel, chunk, message, record, text};
 
-/// A log whose summary lists one channel; its second chunk defines another.
+/// A log with two channels. The summary lists one of them, and the second chunk defines the other one.
 fn with_a_late_channel() -> Vec<u8> {
     let depth = channel(1, "/raw/depth", &[0; 4]);
     let first = [message(1, 5, b"a"), message(9, 6, b"b")].concat();
@@ -21,7 +21,7 @@ fn with_a_late_channel() -> Vec<u8> {
     [&data, &summary, &footer, MAGIC].concat()
 }
 
-/// Remaining messages and losses of a log.
+/// Messages and losses in the rest of a log.
 fn rest(log: &mut LogReader<Cursor<Vec<u8>>>) -> (Vec<Vec<u8>>, Vec<String>) {
     let mut messages = Vec::new();
     while let Some(message) = log.next().unwrap() {
@@ -42,7 +42,7 @@ fn channel_defined_later_is_unknown_after_seeking_back() {
         log.go_to(&begin).unwrap();
         assert_eq!(rest(&mut log), straight);
     }
-    // A reader that has read nothing knows the channel at the end.
+    // A reader that seeks to the end, without reading before, knows both channels.
     let mut other = LogReader::new(Cursor::new(with_a_late_channel()), "late".to_owned()).unwrap();
     other.go_to(&end).unwrap();
     assert_eq!((rest(&mut other), other.header().sources.len()), ((Vec::new(), straight.1), 1));

@@ -1,4 +1,4 @@
-//! Impossible timestamps, and clocks that jump by years.
+//! Impossible timestamps, and clock jumps of several years.
 
 use headrace_tests::{Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -18,10 +18,10 @@ const READING: [&[&str]; 7] = [
     &["recover", "odd.mcap", "-o", "recovered.mcap", "--force"],
 ];
 
-/// A time computed from number and time of a message.
+/// A new time, computed from a message's number and its time.
 type Stamp<'a> = &'a dyn Fn(u64, u64) -> u64;
 
-/// Writes the dive with times changed by `stamp`.
+/// Writes the dive with the times that `stamp` returns.
 fn odd(folder: &Folder, stamp: impl Fn(u64, u64) -> u64) {
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);
@@ -31,7 +31,7 @@ fn odd(folder: &Folder, stamp: impl Fn(u64, u64) -> u64) {
     write_log(&folder.path("odd.mcap"), WriteOptions::new(), Some(VEHICLE), &messages);
 }
 
-/// Runs all commands, which must end; returns their results.
+/// Runs all commands and returns their results. Every command must end.
 fn all(folder: &Folder) -> Vec<Ran> {
     READING.iter().map(|arguments| run(folder, arguments)).collect()
 }
@@ -58,7 +58,7 @@ fn messages_with_impossible_times_are_reported_and_skipped() {
             }
         }
     }
-    // The log contains nothing else.
+    // In these logs, every message has an impossible time.
     for stamp in [u64::MAX, i64::MAX as u64, 0] {
         odd(&folder, |_, _| stamp);
         let codes: Vec<_> = all(&folder).iter().map(|ran| ran.code).collect();

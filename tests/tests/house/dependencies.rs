@@ -7,12 +7,12 @@ use serde_json::Value;
 
 use super::workspace::root;
 
-/// Names of linked libraries in other languages.
+/// Names of the libraries in other languages that the program links.
 const FOREIGN_LIBRARIES: [&str; 4] = ["hidapi", "lz4", "ring_core_0_17_14_", "zstd"];
-/// Crates that are never built for a supported system; only web pages need them.
+/// Crates that are never built for a supported system, because only web pages need them.
 const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];
 
-/// All packages of the lock file that any feature needs.
+/// All packages in the lock file that are needed with all features.
 fn packages() -> Vec<Value> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--locked", "--all-features"])
@@ -34,7 +34,7 @@ fn allowed() -> BTreeSet<String> {
         .collect()
 }
 
-/// Whether a licence expression (SPDX, or a slash for "or") can be met with these.
+/// Whether the allowed licences satisfy a licence expression (SPDX, or with a slash for "or").
 fn is_met(expression: &str, allowed: &BTreeSet<String>) -> bool {
     let expression = expression.trim();
     let parts = |separator: &str| split_outside_parentheses(expression, separator);
@@ -99,7 +99,7 @@ fn foreign_libraries_are_listed() {
     assert_eq!(linked, known.collect());
 }
 
-/// `deploy/sbom` lists exactly the parts linked into the program, each with licence and checksum.
+/// `deploy/sbom` must list exactly the parts that the program links, each with licence and checksum.
 #[test]
 fn bill_of_materials_lists_exactly_the_linked_crates() {
     let Ok(output) = Command::new("python3").arg(root().join("deploy/sbom")).current_dir(root()).output()

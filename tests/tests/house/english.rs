@@ -1,21 +1,22 @@
-//! The language of the project: links between documents, lengths of documents, and patterns that slow readers down.
+//! Checks the language of the project: links between documents, lengths of documents, and patterns that slow readers
+//! down.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
 use crate::workspace::root;
 
-/// Words in all documents together.
+/// Largest number of words in all documents together.
 const ALL_WORDS: usize = 50_000;
-/// Words in README, which fits on a screen and a half.
+/// Largest number of words in README, about one and a half screens.
 const README_WORDS: usize = 900;
-/// Lines in CHANGELOG.
+/// Largest number of lines in CHANGELOG.
 const CHANGELOG_LINES: usize = 60;
 
-/// Folders whose content is built or fetched.
+/// Folders with built or fetched content.
 const NOT_OURS: [&str; 4] = ["target", "node_modules", ".git", "dist"];
 
-/// All files below the root with one of these extensions, relative to the root, in order.
+/// All files below the root with one of these extensions, sorted, as paths relative to the root.
 fn files(extensions: &[&str]) -> BTreeSet<PathBuf> {
     fn walk(folder: &Path, extensions: &[&str], found: &mut BTreeSet<PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -48,7 +49,7 @@ fn anchor(heading: &str) -> String {
     kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// A path without `.` and `..`.
+/// A path in which `.` and `..` are resolved.
 fn normal(path: &Path) -> PathBuf {
     let mut normal = PathBuf::new();
     for part in path.components() {
@@ -63,7 +64,7 @@ fn normal(path: &Path) -> PathBuf {
     normal
 }
 
-/// What is wrong with a link from a document; `None` if it leads somewhere.
+/// Describes the fault of a link in a document; `None` if the link's target exists.
 fn fault(from: &Path, link: &str) -> Option<String> {
     if link.contains("://") || link.starts_with("mailto:") {
         return None;
@@ -108,7 +109,7 @@ fn broken_links_are_found() {
 }
 
 #[test]
-fn documents_keep_to_their_lengths() {
+fn documents_stay_within_their_length_limits() {
     let words = |file: &Path| read(file).split_whitespace().count();
     let all: usize = files(&["md"]).iter().map(|file| words(file)).sum();
     assert!(all <= ALL_WORDS, "{all} words in all documents; at most {ALL_WORDS}");
@@ -118,10 +119,10 @@ fn documents_keep_to_their_lengths() {
     assert!(changelog <= CHANGELOG_LINES, "{changelog} lines in CHANGELOG; at most {CHANGELOG_LINES}");
 }
 
-/// Words that are no English, or that only this project once used.
+/// Words that aren't English, or that had a meaning in this project only.
 const PRIVATE: [&str; 4] = ["meaned", "surer", "give or take", "overmuch"];
 
-/// A sentence of a comment or document that needs a second reading; `None` if it reads well by these rules.
+/// Reason why a sentence of a comment or document needs a second reading; `None` if these rules find none.
 fn awkward(sentence: &str) -> Option<&'static str> {
     let first = sentence.split_whitespace().next().unwrap_or_default();
     if ["Who", "Whose", "Whom", "What"].contains(&first) && !sentence.trim_end().ends_with('?') {
@@ -130,12 +131,12 @@ fn awkward(sentence: &str) -> Option<&'static str> {
     PRIVATE.into_iter().find(|word| sentence.contains(word))
 }
 
-/// Sentences of a text, roughly: pieces between full stops, with their question marks.
+/// Sentences of a text, roughly: the pieces between full stops. A question keeps its question mark.
 fn sentences(text: &str) -> impl Iterator<Item = &str> {
     text.split(". ").flat_map(|part| part.split_inclusive('?')).map(str::trim)
 }
 
-/// Comments of a source file, each block joined into one line, with the number of its first line.
+/// Comments of a source file. Each block is joined into one line, with the number of the block's first line.
 fn comments(text: &str) -> Vec<(usize, String)> {
     let mut blocks: Vec<(usize, String)> = Vec::new();
     let mut is_open = false;
@@ -163,7 +164,7 @@ fn comments(text: &str) -> Vec<(usize, String)> {
 fn comments_and_documents_have_no_awkward_sentence() {
     let mut faults = Vec::new();
     for file in files(&["rs", "ts", "tsx"]) {
-        // This file names the patterns.
+        // This file contains the patterns themselves.
         if file.ends_with("english.rs") {
             continue;
         }
@@ -185,7 +186,7 @@ fn comments_and_documents_have_no_awkward_sentence() {
     assert!(faults.is_empty(), "{}: {faults:#?}", faults.len());
 }
 
-/// What is wrong with the name of a test; `None` if it reads as subject, condition and result.
+/// Describes the fault of a test's name; `None` if the name has a subject, a condition and a result.
 fn awkward_name(name: &str) -> Option<&'static str> {
     let parts: Vec<&str> = name.split('_').collect();
     if parts.iter().any(|part| ["what", "who", "whose", "whom"].contains(part)) {
@@ -194,7 +195,7 @@ fn awkward_name(name: &str) -> Option<&'static str> {
     if ["of", "where", "when", "while", "without", "with"].contains(&parts[0]) {
         return Some("begins with no subject");
     }
-    // Units are named by single letters, too: 2_s.
+    // A single `s` after a number is the unit seconds: 2_s.
     let possessive =
         parts.windows(2).any(|pair| pair[1] == "s" && pair[0].parse::<f64>().is_err() && pair[0] != "per");
     possessive.then_some("has a possessive")

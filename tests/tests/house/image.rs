@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::workspace::root;
 
-/// Header of an ELF program for 64-bit Arm without a dynamic linker.
+/// Header of an ELF program for 64-bit Arm that needs no dynamic linker.
 fn program() -> Vec<u8> {
     let mut bytes = vec![0; 64];
     bytes[..6].copy_from_slice(b"\x7fELF\x02\x01");
@@ -17,7 +17,7 @@ fn program() -> Vec<u8> {
     bytes
 }
 
-/// Runs the script; `None` without Python.
+/// Runs the script; `None` if Python is missing.
 fn made(program: &Path, folder: &Path) -> Option<Output> {
     let script = root().join("deploy/blueos-image");
     Command::new("python3").arg(script).args([program, folder]).current_dir(root()).output().ok()
@@ -31,8 +31,8 @@ fn json(path: PathBuf) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Every name in the image is the digest of its content, the processor is stated, and the labels are those that
-/// BlueOS reads.
+/// Every file in the image is named by the digest of its content. The image states its processor, and its labels are
+/// those that BlueOS reads.
 #[test]
 fn blueos_image_contains_the_program() {
     let folder = Folder::new();
@@ -72,7 +72,8 @@ fn blueos_image_contains_the_program() {
     assert_eq!(read("permissions")["HostConfig"]["NetworkMode"], "host");
 }
 
-/// An image has no libraries, so programs that need some are refused, and so are files that aren't programs.
+/// The image contains no libraries. So the script refuses programs that need a library, and files that aren't
+/// programs.
 #[test]
 fn blueos_image_refuses_programs_that_cannot_start() {
     let folder = Folder::new();

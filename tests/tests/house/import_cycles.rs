@@ -1,8 +1,8 @@
-//! Finds import cycles between files of a crate; such files can't be understood, tested or moved one by one.
+//! Finds import cycles between files of a crate, because such files can't be understood, tested or moved separately.
 //!
-//! A file depends on the file that defines an imported item. `pub use` is followed to that file and is no dependency
-//! itself. A path in code counts if it begins with `crate`, `super` or `self`. Bare names of child modules don't
-//! count.
+//! A file depends on the file that defines an imported item. `pub use` is followed to that file and counts as no
+//! dependency itself. A path in code counts if it begins with `crate`, `super` or `self`. Bare names of child modules
+//! don't count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -23,21 +23,21 @@ fn no_files_import_each_other_in_a_cycle() {
             found.insert(circle.files.iter().map(name).collect::<BTreeSet<_>>(), imports.collect::<Vec<_>>());
         }
     }
-    assert!(found.is_empty(), "files that import one another in a circle, and their imports: {found:#?}");
+    assert!(found.is_empty(), "import cycles of files, with their imports: {found:#?}");
 }
 
-/// Names from the crate's root.
+/// Path of a module: the names from the crate's root on.
 type Module = Vec<String>;
 
 #[derive(Debug, Default)]
 struct Content {
-    /// Usually one file; several if features choose between them.
+    /// Usually one file; several files if features choose between them.
     files: Vec<PathBuf>,
     used: Vec<Used>,
     reexports: BTreeMap<String, Vec<String>>,
 }
 
-/// Modules of a crate that have their own files.
+/// All modules of a crate that have their own files.
 #[derive(Debug, Default)]
 struct Sources(BTreeMap<Module, Content>);
 
@@ -50,7 +50,7 @@ struct Circle {
 }
 
 impl Sources {
-    /// Reads the modules declared from the crate's root file on.
+    /// Reads all modules that the crate's root file declares, directly or indirectly.
     fn read(root: &Path, load: &dyn Fn(&Path) -> Option<String>) -> Self {
         let mut sources = Self::default();
         let mut waiting = vec![(Module::new(), root.to_owned())];
@@ -58,7 +58,8 @@ impl Sources {
             let text = load(&file).unwrap_or_else(|| panic!("no file {}", file.display()));
             let found = imports(&text);
             let folder = file.parent().unwrap();
-            // Modules of a root or a mod.rs are beside it; those of other files are in a folder of its name.
+            // Modules declared in a root file or a mod.rs are in the same folder. Modules declared in another file
+            // are in a folder with that file's name.
             let own = if module.is_empty() || file.ends_with("mod.rs") {
                 folder.to_owned()
             } else {
@@ -83,7 +84,7 @@ impl Sources {
         sources
     }
 
-    /// Path from the crate's root; `None` if it leads out of the crate.
+    /// Converts a used path to a path from the crate's root; `None` if the path leads out of the crate.
     fn absolute(&self, module: &[String], used: &Used) -> Option<Module> {
         let mut from = [module, &used.inside].concat();
         let mut path = used.path.as_slice();
@@ -106,7 +107,7 @@ impl Sources {
         Some(from)
     }
 
-    /// The module whose file defines the item of a path.
+    /// The module with the file that defines the item at this path.
     fn definition(&self, path: &[String], depth: u32) -> Module {
         let mut here = Module::new();
         for (place, name) in path.iter().enumerate() {
@@ -115,7 +116,7 @@ impl Sources {
                 continue;
             }
             here.pop();
-            // The depth is limited, because two modules may reexport each other with globs.
+            // The depth is limited, because two modules may reexport each other by globs.
             if let Some(behind) = self.0.get(&here).and_then(|content| content.reexports.get(name))
                 && depth < 8
                 && let Some(on) = self.absolute(&here, &Used { inside: Vec::new(), path: behind.clone() })
@@ -155,7 +156,7 @@ impl Sources {
     }
 }
 
-/// Strongly connected components of a graph: the largest sets of nodes that all reach each other (Tarjan 1972).
+/// Strongly connected components of a graph: the largest sets in which every node reaches every other (Tarjan 1972).
 fn components<N: Ord + Clone>(graph: &BTreeMap<N, BTreeSet<N>>) -> Vec<BTreeSet<N>> {
     let mut search = Search { graph, seen: BTreeMap::new(), stack: Vec::new(), found: Vec::new() };
     for node in graph.keys() {
@@ -168,15 +169,15 @@ fn components<N: Ord + Clone>(graph: &BTreeMap<N, BTreeSet<N>>) -> Vec<BTreeSet<
 
 struct Search<'a, N> {
     graph: &'a BTreeMap<N, BTreeSet<N>>,
-    /// Order in which nodes were visited.
+    /// Visited nodes, each with its number in the order of visits.
     seen: BTreeMap<&'a N, usize>,
-    /// Nodes that belong to no component yet.
+    /// Visited nodes that don't belong to a component yet.
     stack: Vec<&'a N>,
     found: Vec<BTreeSet<N>>,
 }
 
 impl<'a, N: Ord + Clone> Search<'a, N> {
-    /// Visits a node; returns the earliest node on the stack that it reaches.
+    /// Visits a node. Returns the smallest visit number on the stack that the node reaches.
     fn visit(&mut self, node: &'a N) -> usize {
         let number = self.seen.len();
         self.seen.insert(node, number);
@@ -201,7 +202,7 @@ impl<'a, N: Ord + Clone> Search<'a, N> {
 mod tests {
     use super::*;
 
-    /// Files of the cycles in a crate of these files; the first file is the root.
+    /// Files of each import cycle in a crate with these files, of which the first one is the root.
     fn circles(files: &[(&str, &str)]) -> Vec<String> {
         let load = |file: &Path| {
             files.iter().find(|(name, _)| Path::new(name) == file).map(|(_, text)| (*text).to_owned())

@@ -1,6 +1,6 @@
-//! Reads the declarations and imports of a Rust file from its tokens, to find which files depend on which.
+//! Reads the declarations and imports of a Rust file from its tokens, to find the files on which the file depends.
 
-/// A token of Rust, as far as imports need it.
+/// A token of Rust, in as much detail as imports require.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Token<'a> {
     Word(&'a str),
@@ -13,24 +13,24 @@ enum Token<'a> {
 
 use Token::{Mark, Separator, Text, Word};
 
-/// A module in a file of its own.
+/// A module with its own file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Declared {
-    /// Names of the inline modules around the declaration and of the module itself.
+    /// Names of the inline modules around the declaration, followed by the name of the module itself.
     pub(crate) name: Vec<String>,
-    /// Value of its `#[path]`.
+    /// Value of the module's `#[path]`.
     pub(crate) file: Option<String>,
 }
 
-/// A path in a file.
+/// A path that is used in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Used {
-    /// Names of the inline modules around it.
+    /// Names of the inline modules around the path.
     pub(crate) inside: Vec<String>,
     pub(crate) path: Vec<String>,
 }
 
-/// Declarations and imports of a file, without those for tests only.
+/// Declarations and imports of a file, except those for tests only.
 #[derive(Debug, Default)]
 pub(crate) struct Imports {
     pub(crate) modules: Vec<Declared>,
@@ -40,11 +40,11 @@ pub(crate) struct Imports {
     pub(crate) reexports: Vec<(String, Vec<String>)>,
 }
 
-/// Reads a file's text.
+/// Reads declarations and imports from the text of a file.
 pub(crate) fn imports(text: &str) -> Imports {
     let tokens = tokens(text);
     let mut found = Imports::default();
-    // Enclosing inline modules, each with the brace depth outside of it.
+    // Enclosing inline modules, each with the brace depth outside the module.
     let mut around: Vec<(&str, usize)> = Vec::new();
     let (mut depth, mut at) = (0_usize, 0);
     while at < tokens.len() {
@@ -73,7 +73,7 @@ pub(crate) fn imports(text: &str) -> Imports {
                     }
                 }
             }
-            // This excludes the `use<..>` of a type.
+            // The condition excludes `use<..>` in a type.
             [Word("use"), next, ..] if *next != Mark('<') => {
                 let end = here.iter().position(|token| *token == Mark(';')).unwrap_or(here.len());
                 let (front, mut leaves) = (Front::of(before), Vec::new());
@@ -152,7 +152,7 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Leaves of a use tree: the local name and the path of each.
+/// Leaves of a use tree, each with its local name and its path.
 fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str, Vec<&'a str>)>) {
     let (mut path, mut rest) = (around.to_vec(), tokens);
     while let [Word(word), Separator, behind @ ..] = rest {
@@ -172,7 +172,7 @@ fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str,
             });
             parts.for_each(|part| tree(part, &path, leaves));
         }
-        // The module itself, also as the target of a glob.
+        // `self` means the module itself, even if it is the target of a glob.
         [Word("self")] => leaves.extend(path.last().copied().map(|name| (name, path.clone()))),
         [Word("self"), Word("as"), Word(name)] => leaves.push((name, path)),
         [Mark('*')] => leaves.push(("*", path)),
@@ -182,7 +182,7 @@ fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str,
     }
 }
 
-/// Number of tokens in a braced block, with both braces.
+/// Number of tokens in a block, including both braces.
 fn block(tokens: &[Token<'_>]) -> usize {
     let mut depth = 0_usize;
     let end = tokens.iter().position(|token| {
@@ -236,7 +236,7 @@ fn tokens(text: &str) -> Vec<Token<'_>> {
     tokens
 }
 
-/// Length of a block comment, with nested ones.
+/// Length of a block comment, including nested comments.
 fn comment(text: &str) -> usize {
     let (mut depth, mut at) = (0_usize, 0);
     loop {
@@ -258,7 +258,7 @@ fn comment(text: &str) -> usize {
     }
 }
 
-/// Length of a string with its quotes.
+/// Length of a string, including its quotes.
 fn quoted(text: &str) -> usize {
     let mut is_escaped = false;
     let end = text.char_indices().skip(1).find(|(_, character)| {
@@ -269,7 +269,7 @@ fn quoted(text: &str) -> usize {
     end.map_or(text.len(), |(at, _)| at + 1)
 }
 
-/// Length of a raw string after its `r`, if there is one.
+/// Length of a raw string after the `r`; `None` if there is no raw string.
 fn raw(text: &str) -> Option<usize> {
     let content = text.trim_start_matches('#');
     let hashes = &text[..text.len() - content.len()];
@@ -278,7 +278,7 @@ fn raw(text: &str) -> Option<usize> {
     Some(hashes.len() + 1 + content.find(&end).map_or(content.len(), |at| at + end.len()))
 }
 
-/// Length of a character literal with its quotes, or of a lifetime's mark.
+/// Length of a character literal including its quotes, or of the mark of a lifetime.
 fn character(text: &str) -> usize {
     let mut characters = text.char_indices().skip(1);
     match (characters.next(), characters.next()) {
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_strings_characters_and_macros_hold_no_imports() {
+    fn comments_strings_characters_and_macros_contain_no_imports() {
         let text = r##"
             // use crate::a;
             /* use crate::b; /* and */ use crate::c; */
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_know_their_inline_modules() {
+    fn paths_include_their_inline_modules() {
         let found = imports(
             "mod a { use super::B; mod c { fn d() { super::e() } } }\nuse super::F;\nmod g { mod h; }",
         );
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn module_may_name_its_file() {
+    fn path_attribute_gives_the_file_of_a_module() {
         let found = imports("#[cfg(feature = \"mesh\")]\n#[path = \"other.rs\"]\npub mod a;");
         let file = Some("other.rs".to_owned());
         assert_eq!(found.modules, [Declared { name: vec!["a".to_owned()], file }]);

@@ -1,20 +1,20 @@
-//! Rules of layers, a core without I/O and locks, file length, and the metadata of each crate.
+//! Checks the rules of layers, a core without I/O and locks, the length of files, and the metadata of each crate.
 
 use std::path::{Path, PathBuf};
 
 use crate::workspace::{Package, root, sources, workspace};
 
-/// Crates of the core, bottom up; each may use only crates before it.
+/// Crates of the core, from bottom to top. Each crate may only use crates before it.
 const CORE: [&str; 8] =
     ["config", "geometry", "sampling", "sensor", "fusion", "coverage", "vehicle", "monitor"];
 
-/// Core crates that a device's crate may use.
+/// Crates of the core that the crate of a device may use.
 const FOR_DEVICES: [&str; 1] = ["sensor"];
 
-/// Crates that the ports may use; ports connect devices with the loop.
+/// Crates that the ports crate may use; it connects devices with the loop.
 const FOR_PORTS: [&str; 3] = ["sensor", "geometry", "monitor"];
 
-/// Crates of `replay/` and plugins that each crate of `replay/` may use, besides the core.
+/// Crates of `replay/` and plugins that each crate in `replay/` may use in addition to the core.
 const FOR_REPLAY: [(&str, &[&str]); 3] = [
     ("replay/simulator", &[]),
     ("replay/player", &["replay/simulator"]),
@@ -41,13 +41,13 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
-/// Rust packages of the other workspace.
+/// Rust packages in the workspace `lab`.
 const LAB: [&str; 4] = ["lab/cost", "lab/engine", "lab/experiments", "lab/tables"];
 
-/// The operator's page, which is no device.
+/// The operator's page, a plugin that isn't a device.
 const PAGE: &str = "plugins/dashboard";
 
-/// Whether a package in a folder may depend on one in another.
+/// Whether a package in the folder `place` may depend on a package in the folder `needed`.
 fn may_need(place: &Path, needed: &Path) -> bool {
     let core = |needed: &Path| CORE.iter().position(|name| needed == Path::new("core").join(name));
     let one_of = |names: &[&str]| names.iter().any(|name| needed == Path::new("core").join(name));
@@ -55,7 +55,7 @@ fn may_need(place: &Path, needed: &Path) -> bool {
     match kind {
         "core" => core(needed).zip(core(place)).is_some_and(|(needed, place)| needed < place),
         "plugins" if place == Path::new("plugins/ports") => one_of(&FOR_PORTS),
-        // The page shows results of the loop.
+        // The page shows the loop's results, so it may use more crates.
         "plugins" if place == Path::new(PAGE) => core(needed).is_some(),
         "plugins" => one_of(&FOR_DEVICES),
         "replay" => {
@@ -65,7 +65,7 @@ fn may_need(place: &Path, needed: &Path) -> bool {
             core(needed).is_some() || others.iter().any(|other| needed == Path::new(other))
         }
         "pictures" => core(needed).is_some(),
-        // The program uses every library, but no test package.
+        // The program may use every library, but no test package.
         "" => !needed.starts_with("tests"),
         "tests" => true,
         _ => panic!("{} has no layer", place.display()),
@@ -131,10 +131,11 @@ fn core_has_no_io_and_no_locks() {
     assert!(said.is_empty(), "{said:#?}");
 }
 
-/// Cargo hides the output of passed tests, so `.ci/count-skipped` could not count other messages.
+/// A skip that is printed with `println!` isn't counted: Cargo hides the output of passed tests from
+/// `.ci/count-skipped`.
 #[test]
 fn skipped_tests_are_reported_only_by_the_helper() {
-    // Split, so that this file isn't found itself.
+    // The text is split, so that this file itself isn't found.
     let printed = ["println!(\"", "skipped: "].concat();
     for folder in ["src", "core", "plugins", "replay", "tests"].into_iter().chain(LAB) {
         for (path, text) in sources(&root().join(folder)) {
@@ -150,7 +151,7 @@ fn every_crate_has_a_description() {
             let text = std::fs::read_to_string(&target).unwrap();
             assert!(
                 text.starts_with("//! "),
-                "{name}: the first line of {} says nothing of it",
+                "{name}: the first line of {} doesn't describe the crate",
                 target.display()
             );
         }
@@ -161,7 +162,7 @@ fn every_crate_has_a_description() {
         }
         let readme = std::fs::read_to_string(package.folder().join("README.md"));
         let readme = readme.unwrap_or_else(|error| panic!("{name}: README.md: {error}"));
-        assert!(readme.contains("[[sensors]]"), "{name}: its README shows no example of a sensor's table");
+        assert!(readme.contains("[[sensors]]"), "{name}: README.md has no example of a sensor's table");
     }
 }
 
@@ -169,19 +170,19 @@ fn every_crate_has_a_description() {
 fn versions_and_lints_are_only_in_the_root_manifest() {
     for (name, package) in workspace() {
         let text = std::fs::read_to_string(package.folder().join("Cargo.toml")).unwrap();
-        assert!(text.contains("[lints]\nworkspace = true"), "{name}: does not take the workspace's lints");
+        assert!(text.contains("[lints]\nworkspace = true"), "{name}: doesn't use the workspace's lints");
         if package.place != Path::new("") {
             let versions: Vec<_> = text.lines().filter(|line| line.contains("version =")).collect();
-            assert!(versions.is_empty(), "{name}: {versions:?}; versions belong into the root's Cargo.toml");
+            assert!(versions.is_empty(), "{name}: {versions:?}; versions belong in the root's Cargo.toml");
         }
     }
 }
 
-/// Document names in a text: words with the file ending of documents.
+/// Names of documents in a text: words with a document's file extension.
 fn documents_in(text: &str) -> impl Iterator<Item = &str> {
     let is_part = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
     text.split(move |c: char| !is_part(c)).map(|word| word.trim_end_matches('.')).filter(|word| {
-        // Split, so that this file names no document.
+        // The extension is split, so that this file names no document.
         word.strip_suffix(["m", "d"].concat().as_str())
             .and_then(|stem| stem.strip_suffix('.'))
             .is_some_and(|stem| !stem.is_empty())
@@ -206,7 +207,7 @@ fn readable(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every document that a text refers to must exist.
+/// Every document must exist that any file refers to.
 #[test]
 fn named_documents_exist() {
     let mut files = Vec::new();
@@ -219,7 +220,7 @@ fn named_documents_exist() {
     };
     let (mut said, mut seen) = (Vec::new(), 0);
     for (file, name) in files.iter().zip(&names) {
-        // The change log names files as they were.
+        // The change log may name files that no longer exist.
         if name == "CHANGELOG.md" {
             continue;
         }
@@ -231,7 +232,7 @@ fn named_documents_exist() {
         }
     }
     assert!(seen > 100, "{seen}");
-    assert!(said.is_empty(), "documents that aren't there: {said:#?}");
+    assert!(said.is_empty(), "documents that don't exist: {said:#?}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Rules of this repository: layers, import cycles, limits of the core, and the metadata of each crate.
+//! Rules of this repository: layers, import cycles, a core without I/O, language, and the metadata of each crate.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 

@@ -1,8 +1,8 @@
-//! Checks that the tests named in `docs/why/promises.md` and `docs/reference/recorder.md` exist.
+//! Checks that the tests exist that `docs/why/promises.md` and `docs/reference/recorder.md` name.
 
 use crate::workspace::root;
 
-/// Checks each row of a page that names a test; returns their number.
+/// Checks that each test named in a page's rows exists; returns the number of these rows.
 fn count_named_tests(page: &str) -> usize {
     let page = std::fs::read_to_string(root().join(page)).unwrap();
     assert!(page.lines().count() < 150);
@@ -30,7 +30,7 @@ fn every_promise_names_an_existing_test() {
 }
 
 #[test]
-fn every_listed_mutation_finds_its_line() {
+fn every_listed_mutation_matches_exactly_one_line() {
     let list = std::fs::read_to_string(root().join("tests/mutants/listed")).unwrap();
     let mut found = 0;
     for line in list.lines().filter(|line| !line.starts_with('#')) {

@@ -9,11 +9,11 @@ use serde_json::Value;
 pub(crate) use headrace_tests::root;
 
 pub(crate) struct Package {
-    /// Folder of the package, from the root.
+    /// Folder of the package, relative to the root.
     pub(crate) place: PathBuf,
-    /// Packages of this workspace that it needs to build, without those for its tests.
+    /// Packages of this workspace on which the package depends, without those for its tests only.
     pub(crate) needs: Vec<String>,
-    /// Root files of its libraries, programs, tests and benches.
+    /// Root files of the package's libraries, programs, tests and benches.
     pub(crate) targets: Vec<PathBuf>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn workspace() -> BTreeMap<String, Package> {
     packages.map(|p| (text(&p["name"]), package(p))).collect()
 }
 
-/// All Rust sources below a folder, with their text.
+/// All Rust sources below a folder, each with its text.
 pub(crate) fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {

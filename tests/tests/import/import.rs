@@ -1,7 +1,7 @@
-//! Validation: foreign logs become headrace logs that the ordinary decoders read.
+//! Validation: foreign logs become headrace logs, which the ordinary decoders read.
 //!
-//! Recordings made by others are in `recordings/`, trimmed. If `HEADRACE_RECORDINGS` is set, they are read at full
-//! length, too.
+//! Recordings made by others are in `recordings/`, trimmed. If `HEADRACE_RECORDINGS` is set, they are also read at
+//! full length.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -54,10 +54,10 @@ fn refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
     for word in words {
         assert!(answer.stderr.contains(word), "{word:?} is not in {}", answer.stderr);
     }
-    assert!(!folder.path("out.mcap").exists(), "no log of a file that is none");
+    assert!(!folder.path("out.mcap").exists(), "a refused file leaves no log");
 }
 
-/// Number of intact entries in a telemetry log, and of messages for its vehicle's sensors.
+/// Number of intact entries in a telemetry log, and number of messages for the vehicle's sensors.
 struct Telemetry {
     entries: u64,
     attitude: u64,
@@ -65,8 +65,9 @@ struct Telemetry {
 }
 
 #[test]
-fn bluerov_telemetry_replays() {
-    // Counts by `oracles/tlog.py`: attitude is ATTITUDE and RAW_IMU, depth is SCALED_PRESSURE2.
+fn bluerov_telemetry_becomes_a_log_that_replays() {
+    // The counts come from `oracles/tlog.py`: attitude counts ATTITUDE and RAW_IMU, and depth counts
+    // SCALED_PRESSURE2.
     let trimmed = Telemetry { entries: 6499 - 4, attitude: 776 + 81, depth: 188 };
     let full_length = Telemetry { entries: 35_916 - 4, attitude: 5245 + 528, depth: 635 };
     for (path, wanted) in recordings::both(TELEMETRY, trimmed, full_length) {
@@ -78,7 +79,7 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
     let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
-    // Four camera frames have a checksum that matches no definition.
+    // Four camera frames have checksums that match no definition, so data is lost.
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     let shown = json(&answer);
     assert!(answer.stderr.contains("4 times"), "{}", answer.stderr);
@@ -106,7 +107,7 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
 }
 
 #[test]
-fn autopilot_memory_log_is_recognised_before_any_question() {
+fn dataflash_log_is_recognised_and_refused() {
     let folder = Folder::new();
     folder.write("00000012.BIN", [b"\xA3\x95\x80".as_slice(), &[7; 500]].concat());
     let dataflash = ["not a Ping Viewer log", "a dataflash log of ArduPilot", ".tlog"];
@@ -231,7 +232,7 @@ fn mapping(columns: &[(&str, &str, &str, &str)]) -> String {
 }
 
 #[test]
-fn table_becomes_the_bytes_of_its_sensors() {
+fn imported_table_becomes_the_bytes_of_its_sensors() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     folder.write("table.csv", TABLE);
@@ -264,7 +265,7 @@ fn table_becomes_the_bytes_of_its_sensors() {
     let heard =
         |id: &str| sources.iter().find(|source| source["id"] == id).unwrap()["frames"].as_u64().unwrap();
     assert_eq!((heard("imu"), heard("ping_left"), heard("tether")), (12, 3, 4));
-    // Three pressures, after the calibration from the sensor's memory.
+    // Three pressures, calibrated with the constants from the sensor's memory.
     assert_eq!(counts["depth"], heard("depth"));
     assert!(heard("depth") > 3);
     std::fs::remove_file(folder.path("out.mcap")).unwrap();
@@ -280,10 +281,10 @@ fn table_becomes_the_bytes_of_its_sensors() {
     refused(&folder, &arguments[1..6], &["--map MAPPING.toml"]);
 }
 
-/// Faulty rows are reported, and none of their values lands in another column.
+/// Faulty rows are reported, and no value of such a row is taken for another column's.
 ///
 /// Faults are truncated rows, decimal commas beside separators, and ranges beyond the setting. A byte order mark
-/// isn't part of the first column's name.
+/// doesn't belong to the name of the first column.
 #[test]
 fn rows_that_contradict_the_header_are_skipped_and_reported() {
     let folder = Folder::new();

@@ -1,9 +1,9 @@
-//! Validation: recorded dives of other vehicles through headrace's decoders.
+//! Validation: headrace's decoders read recorded dives of other vehicles.
 //!
-//! `small.tlog` is a BlueROV2 with ArduSub at the surface, in waves (`recordings/bluerov2_ardusub_logs`): its first
-//! 40 s and, if `HEADRACE_RECORDINGS` is set, all 263 s. With `--nocapture` the tests print counts and ranges.
-//! Expected values come from an independent reader of the same files, `oracles/tlog.py`. Ping360 frames and Imagenex
-//! 852 logs are read in the tests of their crates (`ping1d`, `imagenex881`).
+//! `small.tlog` is a dive of a BlueROV2 with ArduSub at the surface, in waves (`recordings/bluerov2_ardusub_logs`).
+//! The trimmed copy has the first 40 s. If `HEADRACE_RECORDINGS` is set, all 263 s are read, too. With `--nocapture`
+//! the tests print counts and ranges. Expected values come from `oracles/tlog.py`, an independent reader of the same
+//! files. The crates `ping1d` and `imagenex881` test Ping360 frames and Imagenex 852 logs.
 
 use std::path::{Path, PathBuf};
 
@@ -16,20 +16,21 @@ use headrace_sensor::device::Decoder as _;
 use headrace_sensor::reading::{Decoded, Packet, Reading};
 use headrace_tests::recordings;
 
-/// Number of camera frames (component 100) whose checksum matches no definition.
+/// Number of camera frames (component 100) with a checksum that matches no definition.
 const BAD: u64 = 4;
 
-/// Values found by `oracles/tlog.py` in a file; least and greatest, angles in radians with the autopilot's signs.
+/// Values that `oracles/tlog.py` finds in a file. Pairs are minimum and maximum; angles are in radians with the
+/// autopilot's signs.
 struct Wanted {
     frames: u64,
     attitudes: usize,
     roll: [f64; 2],
     pitch: [f64; 2],
     yaw: [f64; 2],
-    /// Also the number of readings of the first pressure sensor.
+    /// Number of force readings, and of readings of the first pressure sensor.
     forces: usize,
     mean_force_g: f64,
-    /// Readings of the second pressure sensor.
+    /// Number of readings of the second pressure sensor.
     pressures: usize,
     pressure_hpa: [f64; 2],
     temperature_degc: [f64; 2],
@@ -65,7 +66,7 @@ fn both() -> Vec<(PathBuf, Wanted)> {
     recordings::both("bluerov2_ardusub_logs/small.tlog", TRIMMED, FULL_LENGTH)
 }
 
-/// Readings of a part in a whole file, and its decoder.
+/// Readings that one part of the decoder gets from a whole file, and the decoder afterwards.
 fn readings(path: &Path, frames: u64, part: Part) -> (Vec<Decoded>, MavlinkDecoder) {
     let file = std::fs::read(path).unwrap();
     let meaning = DecoderSettings { part, system_id: Some(1), component_id: Some(1), latency: DurNs::ZERO };
@@ -78,12 +79,12 @@ fn readings(path: &Path, frames: u64, part: Part) -> (Vec<Decoded>, MavlinkDecod
     }
     let counts = decoder.counts();
     assert_eq!((counts.good_frames, decoder.withheld()), (frames - BAD, 0));
-    // A bad frame may contain more than one byte that could begin a frame.
+    // A bad frame may count twice, because a byte inside it may look like the start of another frame.
     assert!(counts.bad_frames >= BAD && counts.bad_frames <= 2 * BAD, "{counts:?}");
     (readings, decoder)
 }
 
-/// Smallest, largest and mean.
+/// Smallest value, largest value and mean.
 fn spread(values: impl Iterator<Item = f64>) -> (f64, f64, f64) {
     let (mut least, mut most, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
     for value in values {
@@ -136,8 +137,9 @@ fn check_imu(path: &Path, wanted: &Wanted) {
     assert!(up.1 < 6.0 && up.2 < 2.0, "{up:?}");
 }
 
-/// The angle between the measured force and up by the latest attitude, degrees. It is small for a vehicle that hardly
-/// moves, and only if both have their axes right.
+/// Angle between the measured force and the upward direction by the latest attitude, degrees.
+///
+/// The angle is small if the vehicle hardly moves and the axes of both sensors are right.
 fn up(
     attitudes: &[(MonoNs, Rot<headrace_sensor::reading::Level, headrace_geometry::frames::Sensor>)],
     at: MonoNs,
@@ -178,7 +180,7 @@ fn check_pressures(path: &Path, wanted: &Wanted) {
         let pressure = spread(water.iter().map(|water| water.pressure_pa));
         let temperature = spread(water.iter().map(|water| water.temperature_degc));
         println!("{message:?}: {count} pressures {pressure:.1?} Pa, {temperature:.2?} degrees Celsius");
-        // At the surface: half a metre of water and the weather at most.
+        // The vehicle is at the surface, so only weather and half a metre of water change the pressure.
         assert!(pressure.0 > 100_000.0 && pressure.1 < 102_000.0, "{pressure:?}");
         if message == PressureMessage::Second {
             let [least, most] = wanted.pressure_hpa.map(|hpa| 100.0 * hpa);

@@ -1,6 +1,7 @@
-//! Validation: a simulated dive written as a ROS 2 recording and imported gives the same bytes, times and digest.
+//! Validation: a simulated dive is written as a ROS 2 recording and imported. The import gives the same bytes, times
+//! and digest.
 //!
-//! The recording is written by this file's own writer.
+//! A writer in this file writes the recording.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -14,7 +15,8 @@ use headrace_sensor::reading::{Packet, Reading};
 use headrace_tests::{Folder, raw_messages};
 use mcap::{Message, WriteOptions};
 
-/// Plain CDR, little-endian: four bytes of encapsulation, then numbers aligned relative to the end of them.
+/// Plain CDR in little-endian order. Four bytes of encapsulation come first; the numbers are aligned relative to the
+/// fifth byte.
 struct Cdr(Vec<u8>);
 
 impl Cdr {
@@ -52,7 +54,7 @@ impl Cdr {
     }
 }
 
-/// A device's message as topic, type and CDR; `None` for one without content of its own.
+/// Topic, type and CDR of a device's message; `None` for a message without content of its own.
 type Written = Option<(String, &'static str, Cdr)>;
 
 struct Translator {
@@ -116,7 +118,7 @@ impl Translator {
             }
             id if id.starts_with("ping") => {
                 let mm = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
-                // An echosounder assumes 1500 m/s, but the water has 1447.
+                // An echosounder assumes a speed of sound of 1500 m/s, but in this water it is 1447 m/s.
                 let range_m = if mm == 0 { f64::INFINITY } else { f64::from(mm) / 1000.0 * 1447.0 / 1500.0 };
                 let cdr = stamped.number([0]).f32(0.4).f32(0.3).f32(100.0).f32(range_m);
                 Some((format!("/{id}"), "sensor_msgs/msg/Range", cdr))
@@ -159,7 +161,7 @@ fn recording(messages: &[Message<'_>]) -> Vec<u8> {
 }
 
 #[test]
-fn ros_recording_gives_the_same_dive() {
+fn imported_ros_recording_gives_the_same_dive() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let messages = raw_messages(&dive);
@@ -173,7 +175,7 @@ fn ros_recording_gives_the_same_dive() {
     assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
     let imported = folder.read("out.mcap");
     let got = raw_messages(&imported);
-    // Messages of the same moment are in another order, which doesn't matter.
+    // The order of messages with equal times differs, which doesn't matter, so both are sorted.
     let shown = |messages: &[Message<'_>]| {
         let mut all: Vec<_> = messages
             .iter()
@@ -189,6 +191,6 @@ fn ros_recording_gives_the_same_dive() {
     for (got, wanted) in got.iter().zip(&wanted) {
         assert_eq!(got, wanted);
     }
-    // The headrace log has ticks; the other is read by time.
+    // The original log replays by its ticks, and the imported one by time.
     assert_eq!(folder.digest("out.mcap", &[]), folder.digest("dive.mcap", &[]));
 }

@@ -1,4 +1,4 @@
-//! Validation: recordings written by Python's `rosbags` (tests/ros/make.py) give the same messages as tables of the
+//! Validation: recordings written by Python's `rosbags` (tests/ros/make.py) give the same messages as tables with the
 //! same values.
 //!
 //! Faults of a recording are reported.
@@ -21,7 +21,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// A folder with recordings, tables and the vehicle file, and a mapping with `further` in each of its tables.
+/// A folder with recordings, tables, the vehicle file and a mapping. Each table of the mapping contains `further`.
 fn folder(further: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
@@ -44,7 +44,7 @@ fn import(folder: &Folder, file: &str, map: &str) -> Answer {
     folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "--map", map, "-o", "out.mcap", "--json"])
 }
 
-/// A message: topic, nanoseconds after 1970 by the log's anchor, and bytes.
+/// A message: topic, nanoseconds since 1970 (by the log's clock anchor), and bytes.
 type Heard = (String, u64, Vec<u8>);
 
 fn heard(folder: &Folder) -> Vec<Heard> {
@@ -109,11 +109,13 @@ fn recordings_of_all_kinds_match_the_tables() {
                 "{name}: {topic}"
             );
         }
-        // Angles of points are computed anew, and a beam without a return has no point.
+        // The import computes angles from points. A beam without a return has no point, so these messages are left
+        // out.
         let wanted: Vec<_> =
             of(&tables, "/raw/sonar_1").into_iter().filter(|(_, _, bytes)| bytes[8..10] != [0, 0]).collect();
         assert_eq!(of(&got, "/raw/sonar_1"), wanted, "{name}");
-        // A table can't state a missing return, so ping numbers differ. Only distance and confidence are compared.
+        // A table can't contain a missing return, so ping numbers differ, and only distance and confidence are
+        // compared.
         let distances = |all: &[Heard]| -> Vec<_> {
             let pings = of(all, "/raw/ping_left").into_iter();
             pings.map(|(_, at_ns, bytes)| (*at_ns, bytes[8..14].to_vec())).collect()
@@ -142,7 +144,7 @@ fn stamps_of_another_time_base_are_reported_and_can_be_used() {
     assert!(!answer.stderr.contains("/cable"), "{}", answer.stderr);
     let recorded = heard(&folder);
     assert_eq!(of(&followed, "/raw/imu"), of(&recorded, "/raw/imu"));
-    // A scan's stamp is that of its first beam; it is recorded with its last.
+    // The stamp of a scan is the time of its first beam, but the scan is recorded when its last beam is complete.
     assert_eq!(import(&folder, "humble.mcap", "header.toml").code, Some(0));
     assert_eq!(of(&heard(&folder), "/raw/sonar_0"), of(&recorded, "/raw/sonar_0"));
     let answer = import(&folder, "boot_time.mcap", "header.toml");
@@ -230,7 +232,7 @@ fn wrong_mappings_are_refused() {
     );
 }
 
-/// Imports a file after `change`; returns exit code and output.
+/// Imports a file after the bytes were modified by `change`; returns exit code and output.
 fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (Option<i32>, String) {
     let mut bytes = fixture(name);
     change(&mut bytes);
@@ -240,10 +242,11 @@ fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (O
     (answer.code, answer.stderr)
 }
 
-/// Raises the stated number of messages by three.
+/// Increases the number of messages in the statistics by three.
 fn state_three_more(bytes: &mut [u8]) {
     let number = |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
-    // The closing magic has 8 bytes. The footer before it has 20, and their first 8 give the start of the summary.
+    // The closing magic has 8 bytes, and the footer before it has 20. The footer begins with the position of the
+    // summary.
     let mut at = usize::try_from(number(bytes, bytes.len() - 28)).unwrap();
     while bytes[at] != mcap::records::op::STATISTICS {
         at += 9 + usize::try_from(number(bytes, at + 1)).unwrap();
@@ -301,7 +304,7 @@ fn damage_of_a_recording_is_reported() {
     let (code, said) = changed(&folder, "none.bag", longer);
     assert!(code == Some(3) && said.contains("the bag states "), "{said}");
     let undefined = |bytes: &mut Vec<u8>| {
-        // Changes the number of the first definition in a chunk; the one at the end stays.
+        // Changes the number of the first definition inside a chunk. The definition at the end of the file remains.
         let chunk = find(bytes, b"compression=", 0);
         let at = find(bytes, b"conn=", chunk);
         bytes[at + 5] = 99;
@@ -309,7 +312,7 @@ fn damage_of_a_recording_is_reported() {
     let (code, said) = changed(&folder, "none.bag", undefined);
     assert!(code == Some(3) && said.contains("connection without an earlier definition"), "{said}");
     let twice = |bytes: &mut Vec<u8>| {
-        // Gives the second definition the number of the first.
+        // Gives the second definition the same number as the first one.
         let chunk = find(bytes, b"op=\x05", 0);
         let first = find(bytes, b"conn=", chunk);
         let second = find(bytes, b"op=\x07", find(bytes, b"op=\x07", first) + 1);
@@ -344,7 +347,7 @@ fn other_file_kinds_are_refused() {
     refused(&folder, "dive.mcap", None, &["is a dive log already"]);
 }
 
-/// A hand-made recording: messages in plain CDR, each with topic, type and time in seconds.
+/// A hand-made recording in plain CDR. Each message has a topic, a type and a time in seconds.
 fn recording(messages: &[(&str, &str, u64, Vec<u8>)]) -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::WriteOptions::new().profile("ros2").create(&mut file).unwrap();
@@ -431,7 +434,7 @@ fn missing_and_odd_values_are_reported() {
         assert!(answer.stderr.contains(words), "{words:?} is not in {}", answer.stderr);
     }
     let shown: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // Four samples: times, orientation of the first, four rates, three forces.
+    // Four samples: times, orientation of the first sample, four rates, and three forces.
     assert_eq!(shown["messages"]["imu"], 4 + 1 + 4 + 3);
     let (_, report) = folder.replay("out.mcap", &[]);
     assert!(report["sources"].as_array().unwrap().iter().all(|source| source["bad_frames"] == 0));

@@ -1,6 +1,6 @@
-//! Alerts and operator commands are the same for any tick length, in replay and in verify.
+//! Alerts and operator commands are the same for any tick length, in replay and in `verify`.
 //!
-//! Commands change no result but the alerts.
+//! Commands change no result except the alerts.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
@@ -16,14 +16,14 @@ use headrace_simulator::{START, Scene, Simulation};
 use headrace_tests::{Folder, scenes};
 use serde_json::Value;
 
-/// Fast over a stretch, then back over a part of it; a head dies and comes back.
+/// The vehicle is fast over a stretch and then goes back over a part of it. A head dies and recovers.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 10\nspeed_mps = 0.18\n
 [[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.4\n
 [[trajectory.legs]]\ndistance_m = 6\nspeed_mps = -0.18\n
 [[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.18\n
 [[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_1\"]\nfrom_s = 35\nfor_s = 12\n";
-/// Time at which the head dies, seconds after the beginning.
+/// Time at which the head dies, seconds after the start.
 const DIES_S: f64 = 35.0;
 
 struct Packet {
@@ -48,7 +48,7 @@ fn after(seconds: f64) -> MonoNs {
     START + DurNs::from_secs_f64(seconds)
 }
 
-/// Operator actions, some of which are no valid command.
+/// Operator actions. Some of them are invalid commands.
 const COMMANDS: [(f64, &str); 14] = [
     (12.0, r#"{"do":"note","text":"start of the lining","by":"AB"}"#),
     (20.0, r#"{"do":"voice","id":7,"by":"AB"}"#),
@@ -89,7 +89,7 @@ fn armed(scene: &Scene) -> (Loop, Vec<Port>) {
 
 type Change = (MonoNs, AlertChange, ListedAlert);
 
-/// Runs a dive with ticks of `tick_ms`; returns the loop and the changes of alerts.
+/// Runs a dive in ticks of `tick_ms`. Returns the loop and all changes of alerts.
 fn dive(scene: &Scene, packets: &[Packet], tick_ms: i64) -> (Loop, Vec<Change>) {
     let (mut dive, mut ports) = armed(scene);
     let mut changes = Vec::new();
@@ -142,7 +142,7 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
     for change in ["raised", "acknowledged", "silenced", "rectified", "cleared", "changed"] {
         assert!(done.iter().any(|done| done.as_str() == change), "{change}");
     }
-    // An alert that is over requires no action.
+    // An alert requires no action once its condition is over.
     let around = expected.surroundings();
     let asks = |alert: &&ListedAlert| !alert.advice(&around).is_empty();
     let (holding, over): (Vec<_>, Vec<_>) =
@@ -154,7 +154,7 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
     assert!((1.0..4.0).contains(&x_m), "{x_m}");
     let voice = &report["notes"][1];
     assert_eq!(voice["voice"], serde_json::json!({"id": 7, "seconds": 5}));
-    assert_eq!(voice["at_s"], after(20.0).as_secs_f64(), "of the moment when it began");
+    assert_eq!(voice["at_s"], after(20.0).as_secs_f64(), "the note has the time at which it began");
     let counts = ConsoleCounts { packets: 14, invalid: 1, without_effect: 2 };
     assert_eq!(expected.console_counts(), counts);
     assert_eq!(report["sources"].as_array().unwrap().len(), scene.vehicle.sensors.len());
@@ -167,7 +167,7 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
 }
 
 #[test]
-fn commands_change_no_result_but_alerts() {
+fn commands_change_no_result_except_alerts() {
     let scene = scenes::scene(SCENE);
     let (plain, _) = dive(&scene, &sent(&scene), 20);
     let (operated, _) = dive(&scene, &with_commands(&scene), 20);
@@ -181,7 +181,7 @@ fn commands_change_no_result_but_alerts() {
         }
     }
     assert_eq!(one, other);
-    // An invalid command changes nothing at all.
+    // Invalid commands change nothing at all.
     let mut packets = sent(&scene);
     let source = scene.vehicle.sensors.len();
     for (number, bytes) in
@@ -204,22 +204,22 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
             told.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
-    // A second one follows after the way back, during which any speed is allowed.
+    // A second alert follows after the way back, on which any speed is allowed.
     let too_fast = raised(ListKind::TooFast);
     assert!(matches!(too_fast[..], [first, again] if first < 10.0 && again > 100.0), "{too_fast:?}");
-    // After it is over, the alert still shows the speed that was too fast, not the later one.
+    // When its condition is over, the alert still shows the speed that was too fast, not a later one.
     let fast = dive.alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
     let Figures::Advice(figures) = fast.figures else { panic!("{:?}", fast.figures) };
     assert!(figures.speed_mps > 1.2 * figures.v_max_mps, "{figures:?}");
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
         panic!("{:?}", raised(ListKind::SensorSilent))
     };
-    // Limits: the head's last reading, 2 s, and one update; no latch time is configured.
+    // The alert comes 2 s after the head's last reading, plus one update. No latch time is configured.
     assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
     let head = dive.alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
     assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");
-    assert_eq!(head.state, AlertState::Rectified, "it returned, and the alert is unacknowledged");
-    // One alert for the missed stretch, a part of which a later pass has filled.
+    assert_eq!(head.state, AlertState::Rectified, "the head returned, and the alert is unacknowledged");
+    // The missed stretch has one alert, although a later pass has filled a part of it.
     let missed = raised(ListKind::Missed);
     let runs = dive.coverage().sections.runs().all();
     assert!(missed.len() <= runs.len() && !missed.is_empty(), "{missed:?}, {} runs", runs.len());
@@ -249,10 +249,10 @@ fn dive_with_only_silent_sensors_raises_alerts_in_time() {
     assert!((2.0..=2.6).contains(&at.since(last).as_secs_f64()), "{:?}", at.since(last));
     let of_one = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
     assert_eq!(of_one, 0, "one situation, not one for each sensor");
-    assert_eq!(dive.tally().span.unwrap().1, last, "the console is no sensor");
+    assert_eq!(dive.tally().span.unwrap().1, last, "operator input counts as a sensor");
 }
 
-/// Commands from any thread get the dive's clock as timestamp.
+/// The timestamp of a command from another thread is the dive's clock.
 #[test]
 fn commands_from_any_thread_reach_the_loop() {
     let scene = scenes::scene(SCENE);
@@ -262,7 +262,7 @@ fn commands_from_any_thread_reach_the_loop() {
     }
     let mut dive = app.arm(scene.vehicle.navigation()).unwrap();
     let (mut input, port) = ConsoleInput::new(&mut dive, None).unwrap();
-    assert!(ConsoleInput::new(&mut dive, None).is_none(), "there is one");
+    assert!(ConsoleInput::new(&mut dive, None).is_none(), "there already is an operator input");
     let by = Who::new("AB").unwrap();
     let threads = [(); 4].map(|()| {
         let port = port.clone();
@@ -271,7 +271,7 @@ fn commands_from_any_thread_reach_the_loop() {
         })
     });
     let taken: usize = threads.into_iter().map(|thread| thread.join().unwrap()).sum();
-    assert_eq!(taken, 256, "what waits is bounded");
+    assert_eq!(taken, 256, "the number of waiting commands is bounded");
     while dive.notes().iter().count() < taken {
         input.take_in(MonoNs(7));
         dive.tick(MonoNs(8));
@@ -335,7 +335,7 @@ fn recorded_acknowledgements_replay_and_verify_as_equal() {
     let lines = folder.headrace(&["replay", "live.mcap", "--json-lines"]).stdout;
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).cloned().collect::<Vec<_>>();
-    // The voice note appears again with its duration.
+    // The voice note occurs again, now with its duration.
     assert_eq!(of("note").len(), 4);
     assert!(of("alert_change").iter().any(|line| line["change"] == "acknowledged"));
     let states = of("state");

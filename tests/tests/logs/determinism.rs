@@ -1,7 +1,7 @@
 //! The same bytes in the same order give the same digest.
 //!
-//! This holds live and in replay, for any tick length and speed, and with idle or busy cores. (.ci/run compares debug
-//! and release builds.)
+//! The digest is the same live and in replay, for any tick length and speed, and with idle or busy cores. (.ci/run
+//! compares debug and release builds.)
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,7 +11,7 @@ const TICKS_MS: [&str; 6] = ["1", "5", "20", "100", "777", "60000"];
 
 /// Runs `work` while `threads` threads keep the cores busy.
 fn while_busy<T>(threads: usize, work: impl FnOnce() -> T) -> T {
-    /// Ends the threads, also when `work` panics.
+    /// Ends the busy threads, even if `work` panics.
     struct Stop<'a>(&'a AtomicBool);
     impl Drop for Stop<'_> {
         fn drop(&mut self) {
@@ -51,7 +51,7 @@ fn live_dive_and_its_replay_have_the_same_digest() {
     );
 }
 
-/// Dives in which failed sections settle, later passes clear flags, and verdicts depend on earlier verdicts.
+/// In this dive failed sections settle, later passes clear flags, and verdicts depend on earlier verdicts.
 #[test]
 fn tick_length_does_not_change_failed_and_cleared_sections() {
     let folder = Folder::new();
@@ -74,12 +74,12 @@ fn tick_length_does_not_change_failed_and_cleared_sections() {
 }
 
 #[test]
-fn expected_report_matches_or_each_difference_is_named() {
+fn each_difference_from_the_expected_report_is_named() {
     let folder = Folder::with_dive();
     let (_, mut report) = folder.replay("dive.mcap", &["--report", "golden.json"]);
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
 
-    // Another log name is no difference, but any change of a hole is.
+    // A different name of the log is allowed, but any change of a hole is a difference.
     report["log"]["path"] = "elsewhere.mcap".into();
     folder.write("golden.json", report.to_string());
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
@@ -95,7 +95,7 @@ fn expected_report_matches_or_each_difference_is_named() {
     assert_eq!(places, ["/digest:", &section]);
 }
 
-/// Only values with a stated tolerance may differ, and only within it.
+/// A value may differ only if the golden report states a tolerance for it, and only within this tolerance.
 #[test]
 fn golden_report_may_state_tolerances() {
     let folder = Folder::with_dive();
@@ -132,7 +132,7 @@ fn golden_report_may_state_tolerances() {
     assert_eq!(meets(serde_json::json!({"/sections": -1}), &same), 2);
     let answer = folder.headrace(&["replay", "dive.mcap", "--expect", "golden.json"]);
     assert!(answer.stderr.contains("tolerances of \"/sections\" is -1"), "{}", answer.stderr);
-    // Tolerances are kept when the report is renewed.
+    // A renewed report keeps its tolerances.
     meets(serde_json::json!({"/digest": "any"}), &other);
     folder.replay("dive.mcap", &["--expect", "golden.json", "--bless"]);
     let golden: serde_json::Value = serde_json::from_slice(&folder.read("golden.json")).unwrap();
@@ -155,7 +155,7 @@ fn renewing_a_golden_report_prints_the_changes() {
     assert!(bless(&["--target", "0.4"]).contains("/target_m: 0.4, expected 1.2"));
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json", "--target", "0.4"]).0, Some(0));
     let golden: serde_json::Value = serde_json::from_slice(&folder.read("golden.json")).unwrap();
-    assert!(golden["log"].is_null() && golden["target_m"] == 0.4, "it names no file of this machine");
+    assert!(golden["log"].is_null() && golden["target_m"] == 0.4, "the report names a file of this machine");
     let answer = folder.headrace(&["replay", "dive.mcap", "--bless"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stderr);
 }

@@ -1,4 +1,4 @@
-//! Media that fail during a recording, closed terminals, and the reports of these faults.
+//! Media that fail during a recording, closed terminals, and the way in which these faults are reported.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 const DIVE: [&str; 4] = ["run", "vehicle.toml", "--source", "dive.mcap"];
 
-/// The program started by another one, in a folder.
+/// The program in a folder, started by another program such as strace.
 fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     let [above, options @ ..] = command else { panic!("no command") };
     let mut below = Command::new(above);
@@ -19,7 +19,7 @@ fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     below
 }
 
-/// Whether system calls of a process can be made to fail here.
+/// Whether strace is available, which makes system calls of a process fail.
 fn has_strace() -> bool {
     let can = Command::new("strace").args(["-o", "/dev/null", "true"]).output();
     let can = can.is_ok_and(|output| output.status.success());
@@ -29,7 +29,7 @@ fn has_strace() -> bool {
     can
 }
 
-/// Records a dive with this fault of the system, long enough for several syncs; returns exit code and report.
+/// Records a dive with this system fault. The dive is long enough for several syncs. Returns exit code and report.
 fn with_fault(folder: &Folder, fault: &[&str], records: &[&str]) -> (Option<i32>, Value) {
     let strace = [&["strace", "-f", "-qq", "-o", "trace.txt"][..], fault].concat();
     let records: Vec<&str> = records.iter().flat_map(|record| ["--record", record]).collect();
@@ -43,7 +43,7 @@ fn losses(report: &Value) -> String {
     report["log"]["losses"].to_string()
 }
 
-/// Checks that `replay`, `verify` and `recover` all report a damaged log, each with exit code 3.
+/// Checks that `replay`, `verify` and `recover` each report a damaged log with exit code 3.
 #[track_caller]
 fn all_find_it(folder: &Folder, log: &str, words: &str) {
     let (code, report) = folder.replay(log, &[]);
@@ -67,7 +67,7 @@ fn single_failed_sync_is_reported_and_loses_nothing() {
     assert!(code == Some(3) && told.contains("Input/output error") && told.contains("no message"), "{told}");
     assert!(folder.path("log.part002.mcap").exists());
     all_find_it(&folder, "log.mcap", "recording failed in log.mcap");
-    // The recording's name replays both parts, which give the same dive.
+    // Both parts replay under the recording's name and give the same dive as the original.
     assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
     assert_eq!(folder.replay("recovered.mcap", &[]).1["digest"], digest.as_str());
 }
@@ -80,7 +80,7 @@ fn failed_recording_is_reported_live_and_until_the_end() {
     }
     let strace = ["strace", "-f", "-qq", "-o", "trace.txt", "-e", "trace=fdatasync"];
     let strace = [&strace[..], &["-e", "inject=fdatasync:error=EIO:when=2"]].concat();
-    // Four seconds, so that a second sync ends before the dive does even on a loaded machine.
+    // The dive takes four seconds, so that even on a loaded machine the second sync ends before the dive.
     let arguments = ["--record", "log.mcap", "--speed", "5x", "--json-lines"];
     let output = below(&folder, &strace, &arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(3));
@@ -140,7 +140,7 @@ fn failure_of_one_recording_keeps_the_other() {
     assert!(twice.code == Some(2) && twice.stderr.contains("given twice"), "{}", twice.stderr);
 }
 
-/// A file size limit that splits a log of the dive into several parts; `None` if it can't be set.
+/// A file size limit that splits the log of the dive into several parts; `None` if the limit can't be set.
 fn limit(folder: &Folder) -> Option<String> {
     folder.record("dive.mcap", "whole.mcap", &[]);
     let bytes = std::fs::metadata(folder.path("whole.mcap")).unwrap().len();
@@ -159,7 +159,7 @@ fn file_size_limit_starts_another_part() {
     let mut dive =
         below(&folder, &["prlimit", &limit], &["--record", "log.mcap", "--speed", "20x", "--json"]);
     let output = dive.output().unwrap();
-    assert_eq!(output.status.code(), Some(3), "SIGXFSZ kills nothing: {output:?}");
+    assert_eq!(output.status.code(), Some(3), "SIGXFSZ killed the program: {output:?}");
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(losses(&report).contains("File too large"), "{}", losses(&report));
     all_find_it(&folder, "log.mcap", "File too large");
@@ -185,7 +185,7 @@ fn unread_stderr_does_not_block_a_failing_recording() {
     let folder = Folder::with_dive();
     let Some(limit) = limit(&folder) else { return };
     let (reader, mut stderr) = std::io::pipe().unwrap();
-    // Fills the pipe.
+    // The pipe is full from the start.
     stderr.write_all(&vec![b'.'; 1 << 16]).unwrap();
     let arguments = ["-vv", "--record", "log.mcap", "--speed", "max", "--report", "report.json"];
     let mut dive = below(&folder, &["prlimit", &limit], &arguments);
@@ -196,7 +196,7 @@ fn unread_stderr_does_not_block_a_failing_recording() {
     assert!(losses(&report).contains("File too large"), "{}", losses(&report));
 }
 
-/// Waits until a dive has written to a file; before the dive the file is created empty as a test.
+/// Waits until a dive has written to a file. An empty file doesn't count, because the program creates it as a test.
 fn wait_for(path: &Path, dive: &mut Child) {
     wait_for_more(path, 0, dive);
 }
@@ -264,10 +264,10 @@ fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let mut lines = BufReader::new(dive.stdout.take().unwrap()).lines();
         if end == "TERM" {
-            // Signal handlers are installed before the first line is printed.
+            // The program installs its signal handlers before it prints the first line.
             lines.next().unwrap().unwrap();
         } else {
-            // The header is written earlier; a second write holds the rest of the start.
+            // The first write contains only the header, so the test also waits for later writes.
             wait_for(&folder.path("log.mcap"), &mut dive);
             std::thread::sleep(Duration::from_secs(1));
         }
@@ -276,7 +276,7 @@ fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
             assert!(dive.try_wait().unwrap().is_none(), "{name} has ended the dive");
         }
         signal(end, &dive);
-        // Output is no longer read, as with a closed terminal.
+        // As with a closed terminal, nobody reads the output any more.
         drop(lines);
         // Exit code 1: nothing was inspected.
         assert_eq!(ended(dive), Some(1), "{end}");
@@ -286,7 +286,7 @@ fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
     }
 }
 
-/// A recording that another program removes during the dive is reported at once and continues in another part. The
+/// If another program removes the recording during the dive, this is reported at once and a new part begins. The
 /// removed data is lost.
 #[cfg(target_os = "linux")]
 #[test]
@@ -311,7 +311,8 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
         let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        // The file grows with each sync, twice a second. After some growth certain data exists that can be lost.
+        // Each sync makes the file longer, twice a second. After four syncs the file certainly contains data that can
+        // be lost.
         (0..4).fold(0, |len, _| wait_for_more(&log, len, &mut dive));
         take();
         let output = dive.wait_with_output().unwrap();
@@ -328,7 +329,7 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
         assert_eq!(report["digest"], digest.as_str());
         assert!(losses(&report).contains(words), "{words}: {}", losses(&report));
-        // The rest is present and states the loss before it.
+        // The second part has the rest of the data and states the loss before it.
         let (code, rest) = folder.replay("log.part002.mcap", &[]);
         assert!(code == Some(3) && losses(&rest).contains(words), "{code:?}: {}", losses(&rest));
         assert!(rest["log"]["messages"].as_u64() > Some(1000), "{}", rest["log"]);
@@ -348,7 +349,7 @@ fn moved_recording_is_complete() {
     let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     wait_for(&folder.path("log.mcap"), &mut dive);
     std::fs::rename(folder.path("log.mcap"), folder.path("moved.mcap")).unwrap();
-    // It can't be read back by its name, which the report counts as a loss.
+    // The recorder can't read the moved file back by its old name, and the report counts this as a loss.
     assert_eq!(dive.wait_with_output().unwrap().status.code(), Some(3));
     assert!(!folder.path("log.part002.mcap").exists());
     assert_eq!(folder.digest("moved.mcap", &[]), digest);

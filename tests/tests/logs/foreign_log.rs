@@ -1,7 +1,7 @@
-//! Logs written by any MCAP writer replay to the same digest as the headrace log of the same dive.
+//! Logs from any MCAP writer replay to the same digest as the headrace log of the same dive.
 //!
 //! Such a log has only the devices' data on /raw/ channels, in any compression, chunking and order. It has no vehicle
-//! file, metadata, ticks or /sent/.
+//! file, no metadata, no ticks and no /sent/ channels.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -11,7 +11,7 @@ use mcap::{Compression, WriteOptions};
 
 const WITH_VEHICLE: [&str; 2] = ["--vehicle", "vehicle.toml"];
 
-/// An integer in 0..n from a Lehmer generator.
+/// A random integer from 0 to below `n`, from a Lehmer generator.
 fn draw(state: &mut u64, n: usize) -> usize {
     *state = *state * 48_271 % 2_147_483_647;
     usize::try_from(*state).unwrap() % n
@@ -120,7 +120,7 @@ fn topic_on_two_channels_is_one_source() {
 }
 
 #[test]
-fn another_clock_does_not_change_the_sections() {
+fn clock_offset_does_not_change_the_sections() {
     const UTC_OF_OUR_ZERO_NS: u64 = 1_790_000_000_123_456_789;
     let folder = Folder::with_dive();
     let (_, expected) = folder.replay("dive.mcap", &[]);
@@ -144,7 +144,7 @@ fn another_clock_does_not_change_the_sections() {
     }
 }
 
-/// Copies the devices' messages with Python's `mcap` package, in its reader's order of time.
+/// Copies the devices' messages with Python's `mcap` package, which reads them in time order.
 const COPY: &str = r#"
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer

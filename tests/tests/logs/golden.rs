@@ -1,6 +1,6 @@
-//! Golden logs of hard situations: each replays to its stored report and to its reviewed text.
+//! Golden logs of hard situations. Each log replays to its stored report and to its reviewed text.
 //!
-//! `tests/golden/make` makes logs of new scenes and renews reports.
+//! `tests/golden/make` makes the logs of new scenes and renews reports.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ fn folder() -> PathBuf {
     headrace_tests::root().join("tests/golden")
 }
 
-/// Names of the files with an extension, in order and without the extension.
+/// Names of all files with an extension, sorted and without the extension.
 fn names(ending: &str) -> Vec<String> {
     let entries = std::fs::read_dir(folder()).unwrap();
     let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();

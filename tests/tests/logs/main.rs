@@ -1,4 +1,4 @@
-//! Dive logs: recorded, replayed, verified, recovered and trimmed, also damaged, foreign and odd ones.
+//! Dive logs: recorded, replayed, verified, recovered and trimmed. Includes damaged, foreign and odd logs.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 

@@ -1,4 +1,4 @@
-//! Odd logs: every deviation is reported with the way it was handled, and nothing is accepted silently.
+//! Odd logs. Every deviation is reported together with its treatment, and nothing is accepted silently.
 
 use std::fs::File;
 
@@ -13,7 +13,7 @@ fn replay(folder: &Folder, log: &str) -> Answer {
     folder.headrace(&[&["replay", log], &WITH_VEHICLE[..]].concat())
 }
 
-/// Output of a replay about the log itself.
+/// Lines of a replay's output that concern the log itself.
 fn told(answer: &Answer) -> String {
     let odd = answer.stdout.lines().filter(|line| line.contains("LOST") || line.contains("note"));
     odd.fold(String::new(), |all, line| all + line.trim() + "\n")
@@ -34,7 +34,7 @@ fn messages_of_another_clock_are_skipped_and_reported() {
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: they are stamped by another clock, 56.8 years after that of most messages"#);
 
-    // The same holds if that clock's messages come first: the majority counts, not the first ones.
+    // The result is the same if the messages of the other clock come first, because the majority decides.
     for message in &mut messages {
         message.log_time = match message.channel.topic.as_str() {
             "/raw/depth" => message.log_time - UTC_OF_OUR_ZERO_NS,
@@ -74,7 +74,7 @@ fn messages_too_late_to_be_ordered_are_counted() {
     let mut bytes = folder.read("lying.mcap");
     let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
     let (one, later) = (&chunks[chunks.len() / 2], &chunks[chunks.len() / 2 + 2]);
-    // The chunk header states a later start than the true one.
+    // The test makes the chunk header state a later start than the true one.
     let place = usize::try_from(one.chunk_start_offset).unwrap() + 9;
     bytes[place..][..8].copy_from_slice(&later.message_start_time.to_le_bytes());
     bytes[place + 8..][..8].copy_from_slice(&later.message_end_time.to_le_bytes());
@@ -93,7 +93,7 @@ fn attached_vehicle_file_with_an_unknown_plugin_is_refused() {
     let answer = folder.headrace(&["replay", "foreign.mcap"]);
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
     insta::assert_snapshot!(answer.stderr, @r#"headrace: foreign.mcap/vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50; did you mean "bar100"?"#);
-    // Another vehicle file reads it, whatever plugin its channels name.
+    // With another vehicle file the log can be read, whatever plugin its channels name.
     assert_eq!(replay(&folder, "foreign.mcap").code, Some(0));
 }
 
@@ -101,7 +101,7 @@ fn attached_vehicle_file_with_an_unknown_plugin_is_refused() {
 fn log_of_a_later_format_is_refused() {
     let folder = Folder::with_dive();
     let mut writer = mcap::Writer::new(File::create(folder.path("later.mcap")).unwrap()).unwrap();
-    // Digest of "headrace", "format" and "2", each with its length before it.
+    // Digest of the words "headrace", "format" and "2", with each word's length before it.
     let digest = "5f4cd66e8dd4654ec3c05024c8cca16d3efe0230a90901805f639cd21db7270c";
     let metadata = [("format", "2"), ("sha256", digest)].map(|(k, v)| (k.to_owned(), v.to_owned()));
     let record = mcap::records::Metadata { name: "headrace".to_owned(), metadata: metadata.into() };

@@ -1,4 +1,4 @@
-//! Playback of a recorded dive: pauses, single ticks and seeks change no result and hide no loss.
+//! Playback of a recorded dive: pauses, single ticks and seeks change no result and suppress no loss.
 
 use std::io::Write;
 use std::process::{Output, Stdio};
@@ -22,7 +22,7 @@ use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 use serde_json::Value;
 
-/// Each stop: time, tick, digest, and whether it was the end.
+/// Stops of a playback: time, tick, digest, and whether playback was at the end.
 #[derive(Default)]
 struct Stops(Vec<(MonoNs, u64, u64, bool)>);
 
@@ -66,7 +66,7 @@ impl Outcome {
     }
 }
 
-/// Sources of the packets in the order in which they are consumed.
+/// Sources of the packets in the order in which the loop consumes them.
 #[derive(Resource, Default)]
 struct Consumed(Vec<u16>);
 
@@ -85,12 +85,12 @@ fn watch(inbox: Res<'_, Inbox>, mut consumed: ResMut<'_, Consumed>) {
     consumed.0.extend(inbox.iter().map(|(source, _)| source.0));
 }
 
-/// A headrace log replays in its recorded order of consumption, which receive times don't show. A log without ticks
-/// replays by time.
+/// A headrace log replays in the recorded order of consumption, which can differ from the order of receive times. A
+/// log without ticks replays in time order.
 #[test]
 fn headrace_log_replays_in_consumed_order_and_others_by_time() {
     let folder = Folder::new();
-    // Sources in recorded order, each with its receive time.
+    // Source and receive time of each packet in recorded order.
     let recorded = [(2, 3_000), (0, 1_000), (1, 2_000), (1, 2_500), (0, 2_200)];
     for (ticks, wanted) in [(true, [2, 0, 1, 1, 0]), (false, [0, 1, 0, 1, 2])] {
         let mut app = App::new(vehicle().mission());
@@ -118,7 +118,7 @@ fn headrace_log_replays_in_consumed_order_and_others_by_time() {
     }
 }
 
-/// Executes commands with a snapshot after each `interval` of work; returns the stops and the result.
+/// Executes commands and makes a snapshot after each `interval` of work. Returns the stops and the result.
 fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Duration) -> (Stops, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
@@ -135,7 +135,7 @@ fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Dura
     (stops, Outcome::of(&dive, &player))
 }
 
-/// Time, tick and digest at the end of each tick of a straight replay, and its result.
+/// Runs a straight replay. Returns time, tick and digest at the end of each tick, and the result.
 fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
@@ -148,7 +148,8 @@ fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     (ticks, Outcome::of(&dive, &player))
 }
 
-/// The dive in three forms: from the simulator, by log time; from the recorder, by ticks; and in parts.
+/// The dive in three forms: from the simulator (replays by time), from the recorder (replays by ticks), and in
+/// several parts.
 fn logs() -> Folder {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "ticks.mcap", &[]);
@@ -163,7 +164,7 @@ fn every_seek_reaches_the_state_of_a_straight_replay() {
     for log in ["dive.mcap", "ticks.mcap", "parts"] {
         let (ticks, outcome) = through(&folder, log);
         assert!(outcome.losses.is_empty(), "{:?}", outcome.losses);
-        // Before the last two ticks, because a step there has no end of its own.
+        // Seeks end before the last two ticks, because a single step from there would reach the end of the log.
         let (begun, late) = (ticks[0].0, ticks[ticks.len() - 3].0);
         let span = late.since(begun).0;
         for interval in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
@@ -211,7 +212,7 @@ fn playback_waits_at_the_end_for_a_seek() {
     ];
     let (stops, ended) = play(&folder, "ticks.mcap", &commands, Duration::from_millis(5));
     let at = |(at, tick, digest): (MonoNs, u64, u64), ended| (at, tick, digest, ended);
-    // Each time that it reaches the end, or is resumed there.
+    // Playback stops each time when it reaches the end or is resumed there.
     let expected = [
         at(before, false),
         at(last, false),
@@ -227,7 +228,8 @@ fn playback_waits_at_the_end_for_a_seek() {
     assert_eq!(ended, outcome);
 }
 
-/// Damages a byte in each of three chunks of a log: two adjacent ones in the middle, and a later one.
+/// Damages one byte in each of three chunks of a log. Two of these chunks are adjacent, in the middle; the third
+/// comes later.
 fn damage(folder: &Folder, log: &str) {
     let mut bytes = folder.read(log);
     let mut chunks = Vec::new();
@@ -240,7 +242,7 @@ fn damage(folder: &Folder, log: &str) {
         at += 9 + usize::try_from(len).unwrap();
     }
     for number in [chunks.len() / 2, chunks.len() / 2 + 1, chunks.len() * 3 / 4] {
-        // After the chunk header.
+        // The byte lies after the chunk's header.
         bytes[chunks[number] + 100] ^= 0x55;
     }
     folder.write(log, bytes);
@@ -258,7 +260,8 @@ fn seeking_over_damage_reports_the_same_losses_as_a_straight_replay() {
         assert_eq!(outcome.losses.len(), if log == "parts" { 6 } else { 3 }, "{log}: {:?}", outcome.losses);
         let at = |share: usize| PlaybackCommand::Seek(ticks[(ticks.len() - 1) * share / 100].0);
         for interval in [Duration::from_millis(5), Duration::MAX] {
-            // Seeks to the end, before the damage, to a snapshot after it, and between the damaged places.
+            // Seeks lead to the end, to a time before the damage, to a snapshot after it, and between the damaged
+            // places.
             for jumps in [&[95, 10][..], &[100, 20, 90, 10], &[60, 5, 58, 96, 56]] {
                 let mut commands = vec![PlaybackCommand::Pause];
                 commands.extend(jumps.iter().map(|share| at(*share)));
@@ -268,7 +271,7 @@ fn seeking_over_damage_reports_the_same_losses_as_a_straight_replay() {
             }
         }
     }
-    // Report and exit code are the same, too.
+    // Report and exit code must also be the same.
     for log in ["ticks.mcap", "parts"] {
         let (code, straight) = folder.replay(log, &[]);
         assert_eq!(code, Some(3));
@@ -297,7 +300,7 @@ fn ending_before_seen_damage_still_reports_it() {
         "pause\nseek 1h\nback 10s\nback 1h\nend\n",
         "pause\nseek 19s\nseek 1s\ngo\n",
     ] {
-        // The times of losses may be known more exactly at the end of the log.
+        // Only the number of losses is compared, because their times may be known more exactly at the end of the log.
         let (code, told) = losses(lines);
         assert_eq!((code, told.as_array().unwrap().len()), (Some(3), 3), "{lines}: {told}");
     }
@@ -331,7 +334,7 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
     program.wait_with_output().unwrap()
 }
 
-/// Alternative targets are judged by the whole log. Beside a partial replay their figures would describe another
+/// Judging by other targets uses the whole log. Beside an unfinished replay, these figures would belong to another
 /// dive.
 #[test]
 fn unfinished_replay_is_not_judged_by_other_targets() {

@@ -1,4 +1,5 @@
-//! Damaged logs and full disks: exit codes, messages, and a remaining log that replays to the same digest.
+//! Damaged logs and full disks. Checks exit codes and messages, and that the remaining log replays to the same
+//! digest.
 
 use std::process::Command;
 
@@ -25,7 +26,7 @@ fn recover(folder: &Folder, log: &str, output: &str) -> (Option<i32>, Value) {
 fn damaged_log_and_its_recovery_have_the_same_digest() {
     let (folder, whole) = recorded();
     let mut spotted = whole.clone();
-    // As when a medium loses a block.
+    // The damage is that of a medium that loses a block.
     spotted[whole.len() / 2..][..4096].fill(0);
     for (name, bytes) in [("cut", &whole[..whole.len() * 2 / 3]), ("spotted", &spotted)] {
         let (log, fixed) = (format!("{name}.mcap"), format!("{name}-fixed.mcap"));
@@ -42,7 +43,7 @@ fn damaged_log_and_its_recovery_have_the_same_digest() {
         let losses = |report: &Value| report["log"]["losses"].as_array().unwrap().len();
         assert_eq!(losses(&recovered), losses(&damaged), "{name}: {}", recovered["log"]["losses"]);
     }
-    // Results published live are kept, too.
+    // The recovered log also keeps the results that were published live.
     let answer = folder.headrace(&["verify", "cut-fixed.mcap", "--json"]);
     let told: Value = serde_json::from_str(&answer.stdout).unwrap();
     assert_eq!(answer.code, Some(3), "{told}");
@@ -90,7 +91,7 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
                 assert!(report["log"]["losses"][0].is_string(), "case {case}");
                 lost += 1;
             }
-            // The vehicle file is damaged or lies after the cut.
+            // In this case, the vehicle file is damaged or is after the cut.
             Some(2) => assert!(answer.stderr.contains("no vehicle file"), "case {case}: {}", answer.stderr),
             code => panic!("case {case}: {code:?}: {}", answer.stderr),
         }
@@ -98,12 +99,13 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
     assert!(lost > 20, "{lost} of 40");
 }
 
-/// Records the short dive on a disk of this size and moves the log off it; `None` if no disk can be made.
+/// Records the short dive on a disk of this size, and then moves the log to another disk; `None` if the disk can't be
+/// made.
 fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)> {
     std::fs::create_dir_all(folder.path("disk")).unwrap();
     let program = headrace_tests::program();
     let program = program.get_program().to_str().unwrap();
-    // A private mount that ends with the shell.
+    // The shell has a private mount, which ends with the shell.
     let script = format!(
         "mount -t tmpfs -o size={kilobytes}k none disk || exit 99
         '{program}' run vehicle.toml --source dive.mcap --record disk/log.mcap --speed max --json > report.json 2> said.txt
@@ -120,7 +122,7 @@ fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)>
 fn nearly_full_disk_drops_echoes_and_full_disk_ends_the_recording() {
     let folder = Folder::with_dive();
     let digest = folder.digest("dive.mcap", &[]);
-    // Room for everything small, and room for a few seconds.
+    // The first disk is nearly full, with room for all small messages. The second one has room for a few seconds.
     for (kilobytes, words) in [(20_000, "echo returns"), (80, "recording failed")] {
         let Some((code, report, said)) = on_a_disk_of(&folder, kilobytes) else {
             headrace_tests::skipped("unshare and mount are not allowed here");
@@ -130,12 +132,13 @@ fn nearly_full_disk_drops_echoes_and_full_disk_ends_the_recording() {
         let losses = report["log"]["losses"].to_string();
         assert!(losses.contains(words), "{losses}");
         assert!(said.contains("MB left"), "a warning while the dive goes on: {said}");
-        // The kept part is readable and states the loss.
+        // The recorded part is readable and states the loss.
         let (code, replayed) = folder.replay("small.mcap", &[]);
         let losses = replayed["log"]["losses"].to_string();
         assert!(code == Some(3) && losses.contains("echo returns out"), "{code:?}: {losses}");
         if kilobytes > 1000 {
-            // These heads send short ranges, which are all kept. Only the results of pings are dropped.
+            // These heads send only short messages, so all raw data is kept. Only the published results of pings are
+            // dropped.
             assert_eq!(replayed["digest"], digest.as_str());
         }
     }

@@ -1,4 +1,4 @@
-//! A dive recorded in parts is the same dive: replayed, verified, recovered, and killed while recording.
+//! A dive recorded in several parts equals the dive in one log, when it is replayed, verified, recovered, or killed.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -39,7 +39,7 @@ fn dive_in_parts_replays_and_verifies_as_one() {
     assert!(names(&report).len() >= 3 && names(&report)[..3] == expected, "{:?}", names(&report));
     assert_eq!(names(&whole), [""; 0]);
 
-    // By the recording's name, its folder, or its files in any order.
+    // The recording can be named by its name, by its folder, or by its files in any order.
     let mut files = names(&report);
     files.reverse();
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
@@ -64,12 +64,12 @@ fn dive_in_parts_replays_and_verifies_as_one() {
         answer.stdout
     );
 
-    // Recover joins them to one log.
+    // `recover` joins the parts into one log.
     let answer = folder.headrace(&["recover", "parts", "-o", "joined.mcap"]);
     assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
     assert_eq!(folder.digest("joined.mcap", &[]), whole["digest"].as_str().unwrap());
 
-    // A missing part is a loss, and so are all missing parts but one.
+    // One missing part is reported as a loss. If all parts but one are missing, each of them is reported.
     std::fs::remove_file(folder.path("parts/dive.part002.mcap")).unwrap();
     let (code, lacking) = folder.replay("parts", &[]);
     let losses = lacking["log"]["losses"].to_string();
@@ -85,7 +85,7 @@ fn dive_in_parts_replays_and_verifies_as_one() {
 #[test]
 fn live_report_lists_the_parts_of_the_recording() {
     let folder = Folder::with_dive();
-    // These addresses may have devices or not; the data is too little for a second part.
+    // Devices may or may not exist at these addresses. In either case, the data is too little for a second part.
     let arguments =
         ["run", "vehicle.toml", "--record", "live.mcap", "--rotate", "1GiB", "--for", "1", "--json"];
     let answer = folder.headrace(&arguments);
@@ -126,7 +126,7 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
         let name = format!("killed-{number}");
         std::fs::create_dir(folder.path(&name)).unwrap();
         let log = format!("{name}/dive.mcap");
-        // A part lasts a twentieth of a second of real time.
+        // Each part covers a twentieth of a second of real time.
         let mut dive = headrace_tests::program()
             .args(["run", "vehicle.toml", "--source", "dive.mcap", "--record", &log])
             .args(["--rotate", "1s", "--speed", "20x"])
@@ -147,7 +147,7 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
         };
         assert_eq!(told["differences"], Value::Array(Vec::new()), "{name}: {told}");
         let lost = told["losses"].as_array().unwrap();
-        // Only the part being written and one just begun may be lost.
+        // Only the present part and one that has just begun may have lost data.
         assert!(lost.len() <= 2, "{name}: {told}");
         assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {told}");
         same += told["same_records"].as_u64().unwrap();
@@ -162,7 +162,7 @@ fn part_named_twice_is_read_once() {
     let folder = Folder::with_dive();
     record(&folder, &["--record", "a.mcap", "--rotate", "5s"]);
     let digest = folder.digest("a.mcap", &[]);
-    // As after an error: the first part has the recording's name.
+    // After an error, the first part has the name of the recording.
     std::fs::rename(folder.path("a.part001.mcap"), folder.path("a.mcap")).unwrap();
     let mut names: Vec<String> = std::fs::read_dir(folder.path(""))
         .unwrap()
@@ -175,7 +175,7 @@ fn part_named_twice_is_read_once() {
     for further in [&names[1..], &["a.part002.mcap"], &["./a.part002.mcap", "a.mcap"]] {
         assert_eq!(folder.digest("a.mcap", further), digest, "{further:?}");
     }
-    // A second file that claims the same part is refused, and both are named.
+    // If two files claim to be the same part, both are refused and named.
     std::fs::copy(folder.path("a.part002.mcap"), folder.path("b.mcap")).unwrap();
     let answer = folder.headrace(&["replay", "a.mcap", "b.mcap"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stdout);

@@ -1,4 +1,5 @@
-//! A loop's state saved at any tick and restored into another loop continues to the same state, bit for bit.
+//! A loop's state is saved at any tick and restored into another loop, which then reaches the same states, bit for
+//! bit.
 
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
@@ -26,8 +27,8 @@ const COMMANDS: [&str; 7] = [
     r#"{"do":"nothing"}"#,
 ];
 
-/// All packets of a scene's devices. Every third packet of a byte stream is cut in two, so that frames are incomplete
-/// at any moment.
+/// All packets of a scene's devices. Every third packet of a byte stream is cut in two. So at any moment, some frame
+/// is incomplete.
 pub(crate) fn packets(scene: &Scene) -> Vec<Packet> {
     let mut simulation = Simulation::new(scene).unwrap();
     let mut all = Vec::new();
@@ -63,7 +64,7 @@ fn armed(vehicle: &VehicleConfig) -> (Loop, Vec<Port>) {
     (dive, ports)
 }
 
-/// Runs a loop on packets, with a tick after some of them.
+/// Runs a loop on packets, with ticks after some of them.
 fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     for some in packets.chunks(23) {
         for packet in some {
@@ -74,21 +75,25 @@ fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     }
 }
 
-/// Saves a dive at many moments. From each, another loop runs to the next and must reach the same state.
+/// Saves a dive at many moments. Another loop runs from each saved state to the next one and must reach the same
+/// state.
 fn goes_on_from_anywhere(scene: &Scene) {
     let packets = packets(scene);
     let (mut whole, mut other) = (armed(&scene.vehicle), armed(&scene.vehicle));
     let mut saved = whole.0.save().unwrap();
-    // A stretch that matches no other period of the dive.
+    // The length of a stretch differs from every period in the dive.
     let stretch = packets.len() / 17 + 1;
     for (number, stretch) in packets.chunks(stretch).enumerate() {
         run(&mut whole, stretch);
         other.0.restore(&saved).unwrap_or_else(|why| panic!("stretch {number}: {why}"));
-        assert!(other.0.save().unwrap() == saved, "stretch {number}: another state than was restored");
+        assert!(
+            other.0.save().unwrap() == saved,
+            "stretch {number}: the restored state differs from the saved one"
+        );
         run(&mut other, stretch);
         saved = whole.0.save().unwrap();
         assert_eq!(other.0.digest(), whole.0.digest(), "stretch {number}");
-        assert!(other.0.save().unwrap() == saved, "stretch {number}: another state");
+        assert!(other.0.save().unwrap() == saved, "stretch {number}: the states differ");
     }
     println!("{} packets, {} bytes of state at the end", packets.len(), saved.len());
     for (dive, _) in [&mut whole, &mut other] {
@@ -100,19 +105,19 @@ fn goes_on_from_anywhere(scene: &Scene) {
     assert!(reports[0].dive.samples_valid > 100);
 }
 
-/// Back and forth, so that sections fail, settle and are cleared.
+/// The dive goes back and forth, so that sections fail, settle and are cleared.
 pub(crate) const LEGS: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.197\n\
     [[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.4\n[[trajectory.legs]]\ndistance_m = 7\nspeed_mps = -0.3\n";
 
 pub(crate) const EFFECTS: &str = "[effects]\nrange_noise = { sd_m = 0.02 }\nmissing_returns = { share = 0.1, mean_run = 5 }\n\
     pilot_drift = { across_m = 0.4, yaw_deg = 4 }\n";
 
-/// An inertial unit defined by a DBC file of its frames, as in its crate's README.
+/// An inertial unit with a DBC file that defines its frames, as in the README of its crate.
 const DBC: &str = "dbc = \"sbg_ellipse.dbc\"\naxes = \"frd\"\nsignals.rate = [\"GyroX\", \"GyroY\", \"GyroZ\"]\n\
     signals.force = [\"AccX\", \"AccY\", \"AccZ\"]\nsignals.quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"]\n\
     signals.rate_valid = { signal = \"ImuStatus\", mask = 0x2E1 }\nsignals.sample_time = \"ImuTime\"";
 
-/// A dive of the common test vehicle, with changes to its file.
+/// A dive of the usual test vehicle with changes to the vehicle file.
 fn small_vehicle(change: impl Fn(&str) -> String) -> Scene {
     let vehicle = change(headrace_tests::VEHICLE);
     let load = |name: &str| match name {
@@ -143,7 +148,7 @@ fn snapshot_with_autopilot_and_velocity_log_resumes_identically() {
     goes_on_from_anywhere(&small_vehicle(|_| headrace_tests::other_vehicle()));
 }
 
-/// Another vehicle's state is refused.
+/// A loop refuses the state of another vehicle.
 #[test]
 fn snapshot_of_another_vehicle_is_refused() {
     let two = small_vehicle(str::to_owned);

@@ -1,6 +1,6 @@
 //! Replays on several threads, and loops that share a navigation, give the same ticks as one thread, bit for bit.
 //!
-//! This holds however the feed ends.
+//! The ticks are the same for every kind of end of the feed.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -25,7 +25,7 @@ use crate::snapshots::{EFFECTS, LEGS, Packet, packets};
 
 const THREADS: [usize; 3] = [1, 2, 3];
 
-/// The end of a feed.
+/// Kinds of ends of a feed.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
     /// After its last packet.
@@ -67,7 +67,8 @@ impl PacketSource for Feed {
     }
 }
 
-/// A scene of four heads, back and forth: sections fail, settle and are cleared, and an operator acts.
+/// A scene with four heads and back-and-forth motion. Sections fail, settle and are cleared, and an operator gives
+/// commands.
 fn scene() -> Scene {
     scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{LEGS}{EFFECTS}"))
 }
@@ -84,7 +85,7 @@ fn armed(vehicle: &VehicleConfig, plugin: Option<&dyn Plugin>) -> Loop {
     app.arm(vehicle.navigation()).unwrap()
 }
 
-/// Digest of everything that can be read from a loop after a tick.
+/// Digest of all public data of a loop after a tick.
 fn of_tick(dive: &Loop) -> u64 {
     let mut hasher = DefaultHasher::new();
     let inbox = dive.resource::<Inbox>().unwrap();
@@ -99,7 +100,7 @@ fn of_tick(dive: &Loop) -> u64 {
     hasher.finish()
 }
 
-/// Result of a dive on some number of threads: each tick, the end, and the final report and state.
+/// Result of a dive on a number of threads: each tick, the kind of end, the final report and the final state.
 #[derive(PartialEq)]
 struct Dived {
     ticks: Vec<u64>,
@@ -114,7 +115,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     let (mut ticks, tick) = (Vec::new(), DurNs::from_millis(tick_ms));
     let mut note = |dive: &Loop| ticks.push(of_tick(dive));
     let driven = match threads {
-        // Zero threads: driven without the function under test.
+        // Zero threads means the plain `drive`, without the function under test.
         0 => drive(&mut dive, &mut feed, Pace { tick, speed: None }, &mut note),
         threads => drive_on(threads, &mut dive, &mut feed, tick, &mut note),
     };
@@ -123,7 +124,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     Dived { ticks, error, report, state }
 }
 
-/// Report at the end, and the state before it.
+/// Final report, and the state before the dive was finished.
 fn ended(dive: &mut Loop) -> (Value, Vec<u8>) {
     let state = dive.save().unwrap();
     dive.finish(&mut |_, _| ());
@@ -136,7 +137,7 @@ fn same(one: &Dived, other: &Dived, what: &str) {
     assert_eq!(one.ticks.len(), other.ticks.len(), "{what}: ticks");
     assert_eq!(one.error, other.error, "{what}");
     assert_eq!(one.report, other.report, "{what}");
-    assert!(one.state == other.state, "{what}: another state at the end");
+    assert!(one.state == other.state, "{what}: the final states differ");
 }
 
 #[test]
@@ -182,7 +183,7 @@ fn panicking_thread_is_an_error_and_never_blocks() {
             "{words}"
         );
     }
-    // A panic of the caller is passed on and leaves no thread waiting.
+    // A panic in the caller's function is passed on, and all threads end.
     let mut feed = Feed { packets, next: 0, end: End::Last };
     let mut dive = armed(&scene.vehicle, None);
     let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -191,7 +192,7 @@ fn panicking_thread_is_an_error_and_never_blocks() {
     assert!(caught.is_err());
 }
 
-/// An outlet that is sometimes behind and holds packets back.
+/// An outlet that has a backlog at times and makes the loop hold packets back.
 struct Behind;
 
 #[derive(Resource, Default)]
@@ -210,7 +211,7 @@ fn hold_back(mut inbox: ResMut<'_, Inbox>, mut held: ResMut<'_, Held>) {
     inbox.allowance_bytes = if held.0.is_multiple_of(16) { 0 } else { MAX_TICK_BYTES };
 }
 
-/// A system among those that place pings.
+/// A plugin with a system in the stage that places pings.
 struct Placing;
 
 #[derive(Resource, Default)]
@@ -249,7 +250,7 @@ fn loop_waits_for_slow_outlets_and_plugins_see_every_packet() {
     }
 }
 
-/// A split loop refuses operations that it can't do, and a second split.
+/// A split loop refuses to be saved or split again.
 #[test]
 fn split_loop_cannot_be_saved_or_split_again() {
     let scene = scene();
@@ -264,7 +265,7 @@ fn split_loop_cannot_be_saved_or_split_again() {
 }
 
 #[test]
-fn loops_that_share_a_navigation_end_as_each_would_alone() {
+fn loops_that_share_a_navigation_give_the_same_results_as_alone() {
     let scene = scene();
     let packets = packets(&scene);
     let asked = [(0.3, 0.25), (0.5, 0.25), (0.8, 1.0), (1.2, 0.5)];
@@ -299,7 +300,7 @@ fn loops_that_share_a_navigation_end_as_each_would_alone() {
             for ((asked, mut dive), alone) in asked.iter().zip(together).zip(&alone) {
                 let (report, state) = ended(&mut dive);
                 assert_eq!(report, alone.0, "{asked:?}, {threads} threads");
-                assert!(state == alone.1, "{asked:?}, {threads} threads: another state");
+                assert!(state == alone.1, "{asked:?}, {threads} threads: the states differ");
             }
         }
     }
@@ -323,7 +324,7 @@ fn loops_with_different_placement_cannot_share_a_navigation() {
     assert!(matches!(driven, Err(DriveError::Unlike { number: 1 })), "{driven:?}");
 }
 
-/// The program's own replay with two logs: one damaged in the middle, one truncated.
+/// Replays two logs with the program itself. One log is damaged in the middle, and the other one is truncated.
 #[test]
 fn number_of_threads_does_not_change_the_losses_of_damaged_logs() {
     let folder = Folder::with_dive();

@@ -1,11 +1,11 @@
-//! Trimmed logs: uncut they are the same dive, cut they keep the verdicts inside, and anonymous ones contain no
-//! names.
+//! Trimmed logs. Without a cut they contain the same dive, with a cut they keep the verdicts inside, and anonymous
+//! ones contain no names.
 
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
 use serde_json::Value;
 
-/// Two minutes at a steady speed, long enough for inner sections.
+/// The dive takes two minutes at a steady speed, so that it has inner sections.
 const LONG: &str = r#"name = "long dive"
 vehicle = "vehicle.toml"
 
@@ -33,7 +33,7 @@ fn trim(folder: &Folder, output: &str, further: &[&str]) -> Value {
     serde_json::from_str(&answer.stdout).unwrap()
 }
 
-/// Verdict and hole of each section within a stretch.
+/// Start and verdict of each section within a stretch.
 fn within(report: &Value, from_m: f64, to_m: f64) -> Vec<(f64, String)> {
     let sections = report["sections"].as_array().unwrap().iter();
     let inside = sections.filter_map(|section| {
@@ -45,7 +45,7 @@ fn within(report: &Value, from_m: f64, to_m: f64) -> Vec<(f64, String)> {
 }
 
 #[test]
-fn uncut_trim_keeps_the_dive_and_its_results() {
+fn trim_without_a_cut_keeps_the_dive_and_its_results() {
     let folder = recorded(headrace_tests::SCENE, VEHICLE);
     let digest = folder.digest("live.mcap", &[]);
     for (name, further) in
@@ -64,7 +64,7 @@ fn uncut_trim_keeps_the_dive_and_its_results() {
 }
 
 #[test]
-fn cut_log_says_so_and_keeps_the_verdicts_inside() {
+fn trimmed_log_states_the_cut_and_keeps_the_verdicts_inside() {
     let folder = recorded(LONG, VEHICLE);
     let (_, whole) = folder.replay("live.mcap", &[]);
     let expected = within(&whole, 12.0, 19.0);
@@ -86,7 +86,7 @@ fn cut_log_says_so_and_keeps_the_verdicts_inside() {
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);
         assert!(answer.stdout.contains("this log is an extract"), "{}", answer.stdout);
     }
-    // Only data that existed is reported as removed.
+    // A removed part is reported only if data existed there.
     for (name, further, said, unsaid) in [
         ("later.mcap", ["--from", "20s"], "before was removed", "after was removed"),
         ("earlier.mcap", ["--to", "20s"], "after was removed", "before was removed"),
@@ -139,7 +139,7 @@ fn anonymous_log_has_no_name_address_comment_or_time_of_day() {
     folder.simulate("scene.toml", "plain.mcap");
     folder.record("plain.mcap", "live.mcap", &[]);
     let told = trim(&folder, "public.mcap", &["--anonymise"]);
-    // Attachments and metadata aren't compressed; after this nothing is.
+    // Attachments and metadata aren't compressed, so the file's bytes contain their text.
     let answer = folder.headrace(&["recover", "public.mcap", "-o", "again.mcap"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let text = String::from_utf8_lossy(&folder.read("public.mcap")).to_lowercase();

@@ -1,4 +1,4 @@
-//! Verify compares a replay with the results of the live dive, and reports the first difference.
+//! `verify` compares a replay with the results of the live dive and reports the first difference.
 
 use headrace_tests::{Folder, VEHICLE};
 use serde_json::Value;
@@ -35,7 +35,7 @@ fn verify_passes_at_any_tick_length() {
 #[test]
 fn verify_reports_a_tiny_mount_change_with_tick_sensor_field_and_bits() {
     let folder = recorded();
-    // Two ulps of a metre and a bit, found in the sensor that the id names.
+    // The change moves a place by about two units in the last place. It is found in the named sensor.
     let other = VEHICLE.replacen("mode = \"fastest\"", "mode = \"fastest\"\nangles_deg = [0, 0, 1e-13]", 1);
     folder.write("other.toml", other);
     let (code, told) = verified(&folder, &["live.mcap", "--vehicle", "other.toml"]);

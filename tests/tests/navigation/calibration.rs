@@ -1,11 +1,11 @@
-//! `headrace calibrate`: logs of a vehicle with wrong mounts in its file and late messages.
+//! `headrace calibrate` on logs with wrong mounts in the vehicle file and with late messages.
 
 use std::fmt::Write as _;
 
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Two heads and all sensors that give a position; narrow beams, because the simulated ones are rays here.
+/// Two heads and all sensors for the position. Beam widths are small, because the simulated beams are rays here.
 fn vehicle(front: &str, aft: &str, zero_at_m: f64) -> String {
     let pings = [("left", "0, 90"), ("right", "0, -90"), ("up", "-90, 0"), ("down", "90, 0")];
     let pings = pings.map(|(id, angles)| {
@@ -52,7 +52,7 @@ zero_at_m = {zero_at_m}
     )
 }
 
-/// Mounts as in the file.
+/// Mounts as stated in the file.
 fn filed() -> String {
     vehicle("position_m = [0.1, 0, 0]", "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 180]", 0.0)
 }
@@ -95,7 +95,7 @@ fn found<'a>(report: &'a Value, of: &str, what: &str) -> &'a Value {
         .unwrap_or_else(|| panic!("{of} {what}: {report:#}"))
 }
 
-/// Checks that a latency was found within three of its standard deviations and within `most_ms`.
+/// Checks that the latency is right to three of its standard deviations and to `most_ms`.
 #[track_caller]
 fn assert_latency(report: &Value, of: &str, truth_ms: f64, most_ms: f64) {
     let row = found(report, of, "latency");
@@ -107,7 +107,7 @@ const LATE_UNIT: &str =
     "line_delay = { sensors = [\"imu\"], latency_ms = 80 }\noutliers = { share = 0.08 }\n";
 const LATE_HEAD: &str = "line_delay = { sensors = [\"front\"], latency_ms = 50 }\n";
 
-/// A rotated head, a reversed head, a counter with another zero, and a late inertial unit.
+/// The errors are a rotated head, a reversed head, a wrong zero of the counter, and a late inertial unit.
 #[test]
 fn calibrate_finds_and_offers_wrong_settings() {
     let front = "position_m = [0.1, 0, 0.04]\nangles_deg = [4, 0, 0]";
@@ -178,7 +178,7 @@ fn calibrate_finds_only_the_late_head() {
     let answer = folder.headrace(&["calibrate", "dive.mcap", "--json"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let report: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // The vehicle file accepts less than 32 ms only, because a head answers before its next ping.
+    // The vehicle file accepts only latencies below 32 ms for a head, because a head answers before its next ping.
     let untold = report["untold"].as_array().unwrap();
     let why = untold.iter().find(|row| row["of"] == "front" && row["what"] == "latency").unwrap()["why"]
         .as_str()
@@ -194,8 +194,8 @@ fn calibrate_finds_only_the_late_head() {
     assert_eq!(report["untold"][0]["of"], "water");
 }
 
-/// No other setting may be changed to explain distant walls. The matching speed of sound is reported, whether it or
-/// the wall is wrong.
+/// If all walls seem too near or too far, no other setting may be changed to explain it. The matching speed of sound
+/// is reported, because either it or the wall is wrong.
 #[test]
 fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     for (share, says) in [(0.04, "ranges are -"), (-0.04, "ranges are +")] {
@@ -211,7 +211,7 @@ fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     }
 }
 
-/// Without a stationary phase there are no mounts and no zeros; with a very short log there is no result at all.
+/// A log without a stationary phase gives no mounts and no zeros. A very short log gives no result at all.
 #[test]
 fn calibrate_without_a_stationary_phase_says_so() {
     let folder = folder(false, &filed(), "");

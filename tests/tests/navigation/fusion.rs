@@ -1,4 +1,4 @@
-//! The filter compared with the truth of simulated dives, and with the paper's navigation on the same data.
+//! The filter compared with the truth of simulated dives, and with the navigation of the paper on the same data.
 
 use headrace_fusion::direct::DirectNavigation;
 use headrace_fusion::filter::sources::Consistency;
@@ -8,11 +8,11 @@ use headrace_tests::field::{Figures, POSE, TURN_S, field, figures, nees, rms, sh
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence, Track, dive, filter};
 
-/// Number of seeds; the bounds below belong to this number of dives.
+/// Number of seeds. The bounds below hold for this number of dives.
 const SEEDS: u64 = 20;
-/// Distance that the vehicle covers in a turn of its head, m.
+/// Distance that the vehicle covers in one turn of its head, m.
 const T_X_M: f64 = TURN_S * 0.197;
-/// Number of epochs until the first estimate has settled.
+/// Number of epochs after which the estimate has settled.
 const SETTLED: usize = 50;
 
 type Pick = fn(&Figures) -> f64;
@@ -21,11 +21,11 @@ fn mean_of(all: &[Figures], pick: Pick) -> f64 {
     rms(all.iter().map(pick))
 }
 
-/// One dive with the filter, and the same returns without it and with the truth.
+/// A dive with the filter, figures without the filter, and errors of the holes.
 struct Dives {
     filter: Track,
     without: Figures,
-    /// Error of each section's hole, m, and its reported standard deviation.
+    /// Error of each section's hole with its reported standard deviation, m.
     holes: Vec<(f64, f64)>,
 }
 
@@ -39,7 +39,7 @@ fn dives(seed: u64) -> Dives {
     Dives { filter, without, holes }
 }
 
-/// Error of each section's hole, m, and its reported standard deviation.
+/// Returns the error of each section's hole with its reported standard deviation, m.
 fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
     let pairs = ours.report.sections.iter().filter_map(|ours| {
         let same = |other: &f64| (other - ours.start_m).abs() < 1e-6;
@@ -49,18 +49,18 @@ fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
     pairs.collect()
 }
 
-/// The vehicle file for this kind of inertial unit, which has high noise.
+/// Vehicle file for this inertial unit, which has high noise.
 fn told(name: &str) -> Result<Vec<u8>, String> {
     let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
     let unit = "[navigation]\ngyro_bias_degps = 0.2\ngyro_bias_time_s = 300\naccel_bias_mps2 = 0.02";
     Ok(file.replace("[navigation]", unit).into_bytes())
 }
 
-/// The goal is 0.9. With a noisy unit, walls correct the attitude only in part. The remaining yaw is shared by
-/// neighbouring passes less than the filter assumes.
+/// The goal is 0.9. With a noisy unit, the walls correct the attitude only partly. Neighbouring passes then have less
+/// yaw error in common than the filter assumes.
 const LEAST_APART: f64 = 0.8;
 
-/// Heads apart along the hull make neighbouring passes at quite different times.
+/// If heads are apart along the hull, neighbouring passes are made at quite different times.
 #[test]
 fn holes_of_heads_apart_along_the_hull_are_within_their_bounds() {
     let mut all = Vec::new();
@@ -98,9 +98,10 @@ fn filter_is_accurate_and_consistent_in_field_dives() {
     holes_within_their_bounds(&holes, 0.9);
 }
 
-/// Checks the filter's errors: across and up within 5 cm, across three times smaller than without a filter.
+/// Checks the filter's errors. Lateral and vertical errors are at most 5 cm, and the lateral error is at most a third
+/// of that without the filter.
 ///
-/// The displacement over a turn must be within 2 % of T_x or 3 cm, averaged over the dives.
+/// The displacement during a turn must be right to 2 % of T_x or 3 cm, averaged over the dives.
 fn accuracy(all: &[Dives]) {
     let ours: Vec<Figures> = all.iter().map(|dives| figures(&dives.filter)).collect();
     let theirs: Vec<Figures> = all.iter().map(|dives| dives.without).collect();
@@ -127,8 +128,8 @@ fn accuracy(all: &[Dives]) {
     assert!(mean_of(&ours, |f| f.turn_m) < limit_m, "{:.4} m a turn", mean_of(&ours, |f| f.turn_m));
 }
 
-/// Checks the NEES of the pose. Averaged over the dives for each epoch, it lies within its 95 % bounds in three
-/// epochs of four. Its mean is right to a seventh.
+/// Checks the NEES of the pose. Its average over the dives must be within the 95 % bounds in three of four epochs.
+/// Its mean must be right to a seventh.
 fn consistent_estimates(all: &[Dives]) {
     let epochs = all.iter().map(|dives| dives.filter.epochs.len()).min().unwrap();
     let runs = all.len() as f64;
@@ -148,13 +149,15 @@ fn consistent_estimates(all: &[Dives]) {
         bound(-1.96),
         bound(1.96)
     );
-    // Learnt noise makes the estimate slightly overconfident.
+    // The estimate is slightly overconfident, because the filter learns noise from the same data.
     assert!(within > 0.75 && mean < 6.9, "{within}, {mean}");
 }
 
-/// Checks the NIS of each kind of sensor. Its mean is one to within a fifth, because the noise is learnt. Averaged
-/// over ten seconds and all dives it lies within its 95 % bounds at least a third of the time. For sensors with less
-/// noise than assumed it doesn't lie above the bounds (rounding treated as noise, a compass without steel nearby).
+/// Checks the NIS of each kind of sensor.
+///
+/// The mean must be one to within a fifth, because the filter learns the noise. The average over ten seconds and all
+/// dives must be within the 95 % bounds at least a third of the time. Sensors with less noise than assumed may be
+/// below the bounds. These are sensors with rounding treated as noise, and a compass without steel nearby.
 fn consistent_innovations(all: &[Dives]) {
     for (name, sources, both_sides) in [
         ("head", 0..1, true),
@@ -179,13 +182,14 @@ fn consistent_innovations(all: &[Dives]) {
         let (sum, count) = bins.iter().fold((0.0, 0), |(sum, n), (s, c)| (sum + s, n + c));
         let mean = sum / count as f64;
         println!("NIS of {name}: mean {mean:.3}, within bounds at {within:.2} of times");
-        // Readings of a counter share a rounding error, so each one gets less weight than it would need alone.
+        // Several readings of a counter share one rounding error. So each reading gets less weight than it would get
+        // alone.
         let least = if name == "tether" { 0.1 } else { 0.8 };
         assert!(within > 0.3 && (least..1.2).contains(&mean), "{name}: {mean} {z:.1?}");
     }
 }
 
-/// Mean of chi-square with one degree of freedom, truncated at the gate of 99.9 %.
+/// Mean of chi-square with one degree of freedom if values beyond the 99.9 % gate are excluded.
 const GATED_MEAN: f64 = 0.988;
 const BIN_S: f64 = 10.0;
 
@@ -201,8 +205,8 @@ fn add_to_bins(bins: &mut [(f64, u64)], track: &Track, source: usize) {
     }
 }
 
-/// Checks that D is within two standard deviations of its true value in `least` to 99 % of the sections. The true
-/// value uses the same returns at their true places.
+/// Checks that D is within two standard deviations of the true value in `least` to 99 % of the sections. For the true
+/// value, the same returns are at their true places.
 fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
     let [error_m, arc_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
@@ -213,10 +217,10 @@ fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     assert!((least..=0.99).contains(&within), "{within}");
 }
 
-/// Result of a dive with a silent sensor.
+/// Simulates a dive with a silent sensor.
 ///
-/// It has three parts: whether each error of its epochs is within three standard deviations, the largest ratio, and
-/// the share of pings without a fix.
+/// Returns whether each error of each epoch is within three standard deviations, the largest ratio of an error to its
+/// standard deviation, and the fraction of pings without a fix.
 fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     let scene = field(seed, 40.0);
     let track = dive(&scene, filter(&scene), silence);
@@ -227,7 +231,8 @@ fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     (off.iter().map(|off| *off <= 3.0).collect(), off.iter().copied().fold(0.0, f64::max), lost)
 }
 
-/// Each sensor is lost for a while, and for good. The error stays within its reported bounds and grows no faster.
+/// Each sensor is lost temporarily in one dive and permanently in another. The error must stay within its reported
+/// bounds.
 #[test]
 fn silent_sensors_keep_the_error_within_its_bounds() {
     for (name, sources) in [
@@ -241,7 +246,8 @@ fn silent_sensors_keep_the_error_within_its_bounds() {
         ("everything", vec![0, 1, 2, 3, 4, 5, 6, 7]),
     ] {
         for to_s in [70.0, 120.0, f64::INFINITY] {
-            // In some dives a guessed motion biases the learnt range noise, which shows once the unit is back.
+            // In some dives, the motion guessed during the silence biases the learnt range noise. This shows when the
+            // unit is back.
             let seeds = if name == "the inertial unit" && to_s.is_finite() { 1..=6 } else { 3..=3 };
             let dives: Vec<_> = seeds
                 .map(|seed| silenced(seed, Silence { sources: sources.clone(), from_s: 60.0, to_s }))
@@ -252,8 +258,8 @@ fn silent_sensors_keep_the_error_within_its_bounds() {
             println!(
                 "{name} from 60 to {to_s} s: within 3 sigma {within:.4}, worst {worst:.1}, no fix {lost:.2}"
             );
-            // About 0.3 % of normal errors exceed three standard deviations, and none in such a sample exceeds them
-            // by much.
+            // About 0.3 % of normally distributed errors exceed three standard deviations. In a sample of this size
+            // none exceeds them by much.
             assert!(within > 0.997 && worst < 5.0, "{name} to {to_s}: {within}, {worst}");
             let is_needed = sources.contains(&7) && !sources.contains(&6) && to_s > 100.0;
             assert_eq!(

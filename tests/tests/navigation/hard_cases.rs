@@ -1,4 +1,4 @@
-//! The whole loop in unusual attitudes: over the top, and about a yaw of 180 degrees.
+//! The whole loop in unusual attitudes: pitch beyond 90 degrees, and yaw around 180 degrees.
 
 use std::fmt::Write as _;
 
@@ -11,9 +11,10 @@ use headrace_tests::tracking::{Silence, Track, dive, filter};
 const SCENE: &str = "vehicle = \"vita2-2.toml\"\n[effects]\nmotion_within_turn = {}\n[trajectory]\nkind = \"recorded\"\n\
     file = \"way.csv\"\n";
 
-/// Trajectory out of the horizontal and back, at 0.05 m/s.
+/// Trajectory that leaves the horizontal and returns to it, at 0.05 m/s.
 ///
-/// The vehicle goes nose down and over to 135 degrees, up and over, and beyond 180 degrees to the left and right.
+/// The vehicle pitches nose down to 135 degrees, then nose up and over, and yaws beyond 180 degrees to the left and
+/// right.
 fn way() -> String {
     let turns =
         [(40.0, 0.0, 0.0), (100.0, 135.0, 0.0), (160.0, 0.0, 0.0), (220.0, -135.0, 0.0), (280.0, 0.0, 0.0)];
@@ -34,11 +35,12 @@ fn way() -> String {
     text
 }
 
-/// Largest errors of fixes, and the number of fixes.
+/// Largest errors of fixes, and numbers of fixes in unusual attitudes.
 #[derive(Debug, Default)]
 struct Errors {
     turn_rad: f64,
-    /// Error with the hull within 30 degrees of the tunnel's axis in either direction, and at any angle, m.
+    /// Largest error while the hull is within 30 degrees of the tunnel's axis, in either direction, m. `anywhere_m`
+    /// is the largest error at any angle.
     along_axis_m: f64,
     anywhere_m: f64,
     upside_down: u32,
@@ -69,8 +71,8 @@ fn errors(track: &Track) -> Errors {
     found
 }
 
-/// If beams look along the tunnel and graze the wall, few of them measure the position. The error there exceeds the
-/// filter's standard deviation.
+/// Beams that look along the tunnel graze the wall, so that few of them measure the position. In such attitudes the
+/// error exceeds the filter's standard deviation.
 #[test]
 fn fix_stays_right_over_the_top_and_at_180_degrees() {
     let way = way();

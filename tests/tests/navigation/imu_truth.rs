@@ -1,9 +1,9 @@
 //! Validation: attitude from gyros and accelerometers alone, compared with optical motion capture.
 //!
-//! The filters of Madgwick and Mahony (crate `ahrs`) run on the same samples. The recording is trial 12 of BROAD
-//! (slow hand motion within about a metre; `recordings/imu_broad`), its first 105 s and, if `HEADRACE_RECORDINGS` is
-//! set, all 196 s. With `--nocapture` the test prints the inclination error while the unit moves and the heading
-//! drift over the recording, in degrees.
+//! The filters of Madgwick and Mahony (crate `ahrs`) run on the same samples. The recording is trial 12 of BROAD:
+//! slow hand motion within about a metre (`recordings/imu_broad`). The trimmed copy has the first 105 s. If
+//! `HEADRACE_RECORDINGS` is set, all 196 s are used, too. With `--nocapture` the test prints the inclination error
+//! while the unit moves and the heading drift over the recording, in degrees.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -23,23 +23,24 @@ use headrace_tests::recordings;
 use nalgebra_of_peers as peers;
 
 const NAME: &str = "imu_broad/derived_12_undisturbed_slow_translation_C_95Hz.csv.gz";
-/// Columns used; the full-length recording has others, too.
+/// Names of the columns that the test reads; the full-length recording has more.
 const COLUMNS: [&str; 11] = ["gx", "gy", "gz", "ax", "ay", "az", "qw", "qx", "qy", "qz", "movement"];
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const GRAVITY_MPS2: f64 = 9.81;
 const SAMPLE_S: f64 = 0.0105;
-/// Samples between updates of the error state, as in the filter: about 0.1 s.
+/// Number of samples between updates of the error state. As in the filter, the time between them is about 0.1 s.
 const EPOCH: usize = 10;
-/// Samples in a second.
+/// Number of samples per second.
 const SECOND: usize = 95;
-/// Usual speed of a hand, m/s: the prior for velocity when nothing measures it.
+/// Usual speed of a hand, m/s. It is the prior for the velocity, which nothing measures.
 const HAND_MPS: f64 = 0.5;
-/// A unit is at rest if neither rate nor force varies by more than this within a second: a few times their noise.
+/// A unit is stationary if rate and force vary by no more than this within a second. The values are a few times the
+/// noise.
 const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;
 
-/// A sample in the body's axes; the tunnel's axes are east, north and up.
+/// A sample in the axes of the body. The axes of the tunnel are east, north and up.
 #[derive(Clone, Copy)]
 struct Sample {
     rate_radps: Vec3<Body>,
@@ -74,14 +75,14 @@ fn mean(vectors: impl Iterator<Item = Vec3<Body>>) -> Vec3<Body> {
     sum.scaled(1.0 / count)
 }
 
-/// Size of the bounding box of vectors.
+/// Size of the bounding box around vectors.
 fn spread(vectors: impl Iterator<Item = Vec3<Body>> + Clone) -> f64 {
     let first = vectors.clone().next().unwrap().0;
     let (low, high) = vectors.fold((first, first), |(low, high), v| (low.inf(&v.0), high.sup(&v.0)));
     (high - low).norm()
 }
 
-/// Initial attitude of every filter: level by the force in the first second.
+/// Initial attitude of every filter, levelled by the mean force of the first second.
 fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
     let force = mean(samples.iter().take(SECOND).map(|sample| sample.force_mps2));
     let roll = math::atan2(force.y(), force.z());
@@ -94,7 +95,7 @@ fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
 struct Off {
     inclination_rms: f64,
     inclination_max: f64,
-    /// Heading error at the end, relative to the first true heading.
+    /// Heading error at the end, relative to the heading error at the start.
     drift: f64,
 }
 
@@ -121,7 +122,7 @@ fn judge(samples: &[Sample], mut filter: impl FnMut(&Sample) -> Rot<Tunnel, Body
     }
 }
 
-/// The filter's own components for a unit without other sensors.
+/// Navigation of an inertial unit without other sensors, made of the filter's own components.
 struct Alone {
     settings: Settings,
     state: State,
@@ -131,8 +132,10 @@ struct Alone {
 }
 
 impl Alone {
-    /// Creates it with the usual settings. They belong to a unit whose samples at rest show 0.011 deg/s and 0.0045
-    /// m/s^2 per root hertz, and weren't tuned on this recording.
+    /// Creates the navigation with the usual settings for a unit with a noise of 0.011 deg/s and 0.0045 m/s^2 per
+    /// root hertz.
+    ///
+    /// These figures come from stationary samples. The settings aren't tuned to this recording.
     fn new(attitude: Rot<Tunnel, Body>) -> Self {
         let settings = Settings::default();
         let mut sds = [1e-3; ERRORS];
@@ -176,7 +179,8 @@ impl Alone {
         leg.disturb(&self.settings, &transition, &mut self.factors);
     }
 
-    /// Once a second, constrains the velocity to that of a hand, or to zero at rest, where the gyros show their bias.
+    /// Constrains the velocity once a second: to the speed of a hand, or to zero if the unit is stationary. A
+    /// stationary unit also shows its gyro biases.
     fn end_second(&mut self) {
         let rates = self.second.iter().map(|sample| sample.rate_radps);
         let forces = self.second.iter().map(|sample| sample.force_mps2);
@@ -211,7 +215,7 @@ fn ours(samples: &[Sample]) -> Off {
 type PeerVector = peers::Vector3<f64>;
 type PeerRotation = peers::UnitQuaternion<f64>;
 
-/// Judges a filter of the `ahrs` crate, which uses types of its own.
+/// Judges a filter of the `ahrs` crate, whose vector types are converted.
 fn judge_peer(samples: &[Sample], mut step: impl FnMut(PeerVector, PeerVector) -> PeerRotation) -> Off {
     let vector = |v: Vec3<Body>| PeerVector::new(v.x(), v.y(), v.z());
     judge(samples, |sample| {
@@ -238,12 +242,12 @@ fn mahony(samples: &[Sample], kp: f64, ki: f64) -> Off {
 /// A filter's name and its errors.
 type Judged = (String, Off);
 
-/// The one with the smallest inclination error.
+/// The filter with the smallest inclination error.
 fn best(many: impl Iterator<Item = Judged>) -> Judged {
     many.min_by(|(_, a), (_, b)| a.inclination_rms.total_cmp(&b.inclination_rms)).unwrap()
 }
 
-/// The published filters with their crate's default gains.
+/// The published filters with the default gains of their crate.
 fn usual_peers(samples: &[Sample]) -> [Judged; 2] {
     [
         ("Madgwick, usual gain 0.1".to_owned(), madgwick(samples, 0.1)),
@@ -251,7 +255,7 @@ fn usual_peers(samples: &[Sample]) -> [Judged; 2] {
     ]
 }
 
-/// The published filters with the gains that are best for this recording.
+/// The published filters with the best gains for this recording.
 fn best_peers(samples: &[Sample]) -> [Judged; 2] {
     let betas = [0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.033, 0.05, 0.1, 0.2];
     let kps = [0.01, 0.02, 0.05, 0.07, 0.1, 0.2, 0.5, 1.0, 2.0];
@@ -267,7 +271,7 @@ fn say(name: &str, off: &Off) {
     println!("{name:<60} {:>6.3} {:>7.3} {:>8.2}", off.inclination_rms, off.inclination_max, off.drift);
 }
 
-/// The same samples without the gyros' mean during the rest before the motion.
+/// The same samples with the gyro bias removed, which is the mean rate during the rest before the motion.
 fn unbiased(samples: &[Sample]) -> Vec<Sample> {
     let rest = samples.iter().take_while(|sample| !sample.moving);
     let bias = mean(rest.map(|sample| sample.rate_radps));
@@ -295,7 +299,7 @@ fn no_worse_than_published_filters(samples: &[Sample]) {
         assert!(ours.inclination_rms <= off.inclination_rms, "{name}: {off:?}; ours {ours:?}");
         assert!(ours.drift.abs() <= off.drift.abs(), "{name}: {off:?}; ours {ours:?}");
     }
-    // Even with their bias removed, the published filters come as close only with gains tuned to this recording.
+    // Without gyro bias, the published filters come as close only if their gains are tuned to this recording.
     let unbiased = unbiased(samples);
     for (name, off) in usual_peers(&unbiased) {
         say(&format!("{name}, bias removed"), &off);

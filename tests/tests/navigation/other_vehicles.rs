@@ -1,6 +1,8 @@
-//! A vehicle whose autopilot owns the inertial unit, pressure and distances, with a velocity log.
+//! A vehicle with a velocity log, and with an autopilot that has the inertial unit, the pressure sensor and the
+//! distance sensors.
 //!
-//! Its devices come with their own crates alone, and are tested from the simulator's bytes to navigation.
+//! The crates of these devices are used unchanged. The test covers the way from the simulator's bytes to the
+//! navigation.
 
 use headrace_tests::Folder;
 use serde_json::Value;
@@ -25,7 +27,7 @@ fn autopilot_sensors_and_a_velocity_log_are_fused() {
     folder.simulate("scene.toml", "dive.mcap");
     let (code, report) = folder.replay("dive.mcap", &[]);
     assert_eq!(code, Some(0), "{}", report["log"]["losses"]);
-    // Counts in 40 s, at the rates of their tables.
+    // Numbers of readings in 40 s at the rates in the sensors' tables.
     for (id, readings) in [
         ("imu", 12_000),
         ("depth", 400),
@@ -42,12 +44,13 @@ fn autopilot_sensors_and_a_velocity_log_are_fused() {
             assert_eq!(source[nothing], 0, "{id}: {source}");
         }
     }
-    // Axes, lever and delay are right, so devices without noise agree. With one axis reversed the value is 0.08.
+    // Devices without noise agree if axes, lever arm and delay are right. With one axis reversed, the NIS would be
+    // 0.08.
     let dvl = &source(&report, "dvl")["navigation"];
     println!("velocity log: {dvl}");
     assert_eq!(dvl["gated"], 0, "{dvl}");
-    // The first reading precedes the filter's start, because it arrives 100 ms after its ping. A reading has three
-    // components, twice a second.
+    // The first reading arrives 100 ms after its ping, so the ping precedes the filter's start. There are two
+    // readings a second, with three components each.
     assert!(dvl["late"].as_u64().unwrap() <= 1 && dvl["used"].as_u64().unwrap() > 220, "{dvl}");
     assert!(dvl["nis"].as_f64().unwrap() < 0.001, "{dvl}");
     let dive = &report["dive"];

@@ -1,7 +1,7 @@
 //! Sensors that fall silent during a dive.
 //!
-//! Pings that can't be placed are reported. No flag is raised for a hole that going on forward fills. The dive goes
-//! on once the sensors return.
+//! Pings without a position are reported. No flag is raised for a hole that further forward motion fills. When the
+//! sensors return, the dive goes on.
 
 use headrace_tests::{Folder, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -9,10 +9,11 @@ use serde_json::Value;
 
 const LEG: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.197\n";
 
-/// Replays a four-head dive of 12 m without the data of `source` between two times, in seconds of its clock.
+/// Replays a four-head dive of 12 m without the data of `source` between two times, seconds on the source's clock.
 fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     let folder = Folder::new();
-    // The heads' bodies aren't simulated, so nothing is hidden and the paper's speed meets the target.
+    // The simulation omits the bodies of the heads. So nothing is hidden, and the speed of the paper meets the
+    // target.
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.197")
         .replace("[navigation]", &format!("[navigation]\nway = \"{way}\""));
@@ -47,7 +48,7 @@ fn tether_loss_without_a_filter_is_a_lost_position_and_raises_no_false_flag() {
     assert!(!failed.is_empty(), "0.8 m of wall without a sample");
     let named = failed.iter().filter(|section| section["cause"]["cause"] == "position_lost").count();
     assert!(2 * named > failed.len(), "{named} of {}: {failed:#?}", failed.len());
-    // The vehicle never turned back, so no flag may have been cleared.
+    // No flag may have been cleared, because the vehicle never turned back.
     assert_eq!(report["summary"]["flags_cleared"], 0, "{}", report["summary"]);
 }
 

@@ -1,7 +1,7 @@
 //! Walls that deviate from the design.
 //!
-//! Bumps that a stationary vehicle sees turn after turn must not make its heading more certain. A fallen vault must
-//! not bias the estimate.
+//! A stationary vehicle sees the same bumps in every turn, which must not make its heading more certain. A fallen
+//! vault must not bias the estimate.
 
 use headrace_fusion::filter::state::{ATTITUDE, POSITION};
 use headrace_geometry::math;
@@ -9,8 +9,10 @@ use headrace_simulator::START;
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence};
 
-/// Root mean square of yaw errors over their standard deviations, and the largest of these, radians, by seed. The
-/// window is 15 to 30 s after the launch.
+/// Root mean square of the ratio of yaw errors to their standard deviations, and the largest standard deviation,
+/// radians.
+///
+/// The figures cover all seeds, and the time from 15 to 30 s after the launch.
 fn yaw(rough: &str) -> (f64, f64) {
     let (mut squares, mut count, mut largest_sd_rad) = (0.0, 0.0, 0.0_f64);
     for seed in 1..=8 {
@@ -41,7 +43,7 @@ fn yaw(rough: &str) -> (f64, f64) {
 }
 
 #[test]
-fn stationary_vehicle_at_a_rough_wall_keeps_an_honest_heading_sd() {
+fn stationary_vehicle_at_a_rough_wall_keeps_a_consistent_heading_sd() {
     let (ratio, _) = yaw("[[tunnel.rough]]\nsd_m = 0.028\nseed = 3\n");
     println!("rough: {ratio:.2} standard deviations");
     assert!((0.3..1.0).contains(&ratio), "{ratio}");
@@ -50,8 +52,8 @@ fn stationary_vehicle_at_a_rough_wall_keeps_an_honest_heading_sd() {
     assert!(ratio < 1.0 && largest_sd_rad.to_degrees() < 0.8, "{ratio}, {largest_sd_rad}");
 }
 
-/// The slopes of the fallen vault begin with centimetres, which look like a change of height. The seeds are those in
-/// which the estimate once followed them.
+/// The fallen vault begins with slopes of some centimetres, which look like a change of height. With these seeds, an
+/// earlier filter followed the slopes.
 #[test]
 fn fallen_vault_does_not_bias_the_estimate() {
     let text = include_str!("../../../deploy/scenes/collapse.toml").replace("../vehicles/", "");

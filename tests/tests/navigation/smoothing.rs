@@ -17,15 +17,15 @@ use headrace_tests::tracking::{self, Epoch, Silence, Track, dive, filter};
 use headrace_vehicle::NavigationConfig;
 
 const SEEDS: u64 = 3;
-/// Capacity for the steps of a dive of ten minutes.
+/// Capacity for the filter's steps in a dive of ten minutes.
 const STEPS: usize = 1 << 13;
 
 struct Smoothed {
-    /// Track of the filter.
+    /// Track from the filter.
     filter: Track,
-    /// Dive along the smoothed track.
+    /// Track of a dive with the smoothed positions.
     dive: Track,
-    /// Smoothed estimates in order of time.
+    /// Smoothed estimates in time order.
     epochs: Vec<Epoch>,
 }
 
@@ -55,20 +55,23 @@ fn smoothed(scene: &Scene, silence: &Silence) -> Smoothed {
 
 type Pick = fn(&Figures) -> f64;
 
-/// Allowed error along the tunnel over the filter's. It is due to cable slack, which no other sensor observes. The
-/// model of slack isn't the scene's (a spline without components faster than its period), so smoothing need not
-/// improve it.
+/// Allowed ratio of the smoothed error along the tunnel to the filter's. The error is due to cable slack, which no
+/// other sensor observes.
+///
+/// The scene's slack is a spline without components faster than its period, and differs from the model of slack. So
+/// smoothing need not reduce this error.
 const SLACK: f64 = 1.25;
 
 struct Dives {
     smoothed: Smoothed,
-    /// Error of each section's hole, m, and its reported standard deviation: filtered, and smoothed.
+    /// Error of each section's hole with its reported standard deviation, m: filtered, and smoothed.
     holes: [Vec<(f64, f64)>; 2],
 }
 
-/// Dives in which slack keeps a quarter of itself after a turn. A smoother depends on its model more than a filter.
-/// With a slack time of 15 s, which keeps more than half and which the filter tolerates, D is within two sigma 88.9 %
-/// of the time.
+/// Dives with a configured slack time of 8 s, with which a quarter of the slack remains after a turn.
+///
+/// A smoother depends more on its model than a filter does. The filter tolerates a slack time of 15 s, with which
+/// more than half remains. But with the smoother, D is then within two sigma in only 88.9 % of the sections.
 fn dives(seed: u64) -> Dives {
     let scene = field_with(seed, 65.0, &SETTINGS.replace("slack_time_s = 15", "slack_time_s = 8"), "");
     let smoothed = smoothed(&scene, &Silence::default());
@@ -84,9 +87,10 @@ fn dives(seed: u64) -> Dives {
     Dives { smoothed, holes }
 }
 
-/// Smoothed errors are no larger than the filter's, and consistent.
+/// Smoothed errors must be consistent and no larger than the filter's.
 ///
-/// The NEES of a pose is near 6, and D is within two standard deviations of the truth 90 to 99 % of the time.
+/// The NEES of a pose must be near 6, and D must be within two standard deviations of the truth in 90 to 99 % of the
+/// sections.
 #[test]
 fn smoothing_reduces_errors_and_stays_consistent() {
     let all: Vec<Dives> = std::thread::scope(|scope| {
@@ -98,7 +102,7 @@ fn smoothing_reduces_errors_and_stays_consistent() {
     let by_filter: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.filter)).collect();
     let smoothed: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.dive)).collect();
     println!("| rms over {SEEDS} dives | filter | smoothed |\n|---|---|---|");
-    // Allowed share of the filter's error.
+    // The last number of a row is the allowed ratio of the smoothed error to the filter's.
     let rows: [(&str, Pick, f64); 8] = [
         ("across, m", |f| f.across_m, 0.5),
         ("up, m", |f| f.up_m, 0.5),
@@ -133,14 +137,16 @@ fn smoothing_reduces_errors_and_stays_consistent() {
             "D of {} sections, {name}: error {error_m:.4} m, sigma {arc_m:.4} m, within two: {within:.3}",
             holes.len()
         );
-        // A slack time configured shorter than the true one gives standard deviations larger than needed.
+        // The configured slack time is shorter than the true one, so the standard deviations are larger than
+        // necessary.
         assert!((0.9..=0.998).contains(&within), "{name}: {within}");
     }
 }
 
-/// With the shipped vehicle's wide settings, smoothing loses nothing that the filter knew, and no error grows.
+/// The shipped vehicle has wide settings. With them, smoothing drops no fix that the filter had, and increases no
+/// error.
 #[test]
-fn smoothing_helps_the_shipped_vehicle() {
+fn smoothing_increases_no_error_of_the_shipped_vehicle() {
     for seed in 1..=2 {
         let track = smoothed(&field_with(seed, 40.0, "[heads]", ""), &Silence::default());
         let [was, is] = [&track.filter, &track.dive].map(figures);
@@ -151,7 +157,7 @@ fn smoothing_helps_the_shipped_vehicle() {
     }
 }
 
-/// Root mean square of an error between two times, and its largest ratio to the standard deviation.
+/// Root mean square of an error between two times, and the largest ratio of the error to its standard deviation.
 fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64) {
     let inside = epochs.iter().filter(|epoch| {
         let at_s = epoch.at.since(START).as_secs_f64();
@@ -167,7 +173,8 @@ fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64)
 fn smoothing_bridges_a_silence_from_both_sides() {
     let scene = field(3, 33.0);
     let from_s = 80.0;
-    // Without walls an estimate is dropped after half a minute, and then there is no later side.
+    // The silence of all sonars is short: without walls the estimate is dropped after half a minute, and then nothing
+    // after the silence could help.
     for (name, sources, errors, to_s) in [
         ("the tether", vec![7], vec![0], from_s + 60.0),
         ("all sonars", vec![0, 1, 2, 3, 4], vec![1, 2], from_s + 10.0),
@@ -190,7 +197,7 @@ fn smoothing_bridges_a_silence_from_both_sides() {
     }
 }
 
-/// Displacement over a turn, on which verdicts depend, with a taut cable.
+/// Verdicts depend on the displacement during a turn. Here the configured cable is taut.
 #[test]
 fn smoothed_displacements_are_accurate_on_a_taut_cable() {
     let settings = SETTINGS.replace("slack_sd_m = 0.085", "slack_sd_m = 0.001");
@@ -219,7 +226,7 @@ fn smoothed_track_is_split_at_a_lost_estimate() {
     assert!(track.epochs.iter().all(|epoch| epoch.factors.is_sound()));
 }
 
-/// Noise, far more slack than the filter assumes, and steel, on the short dive extended to three times its length.
+/// The short dive at three times its length, with noise, steel, and far more slack than the filter assumes.
 const NOISE: &str = "
 [effects]
 imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.002, attitude_deg = 0.5 }

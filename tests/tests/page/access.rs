@@ -26,7 +26,7 @@ fn other_hosts_and_origins_are_refused() {
     assert!(Viewer::connect(&serving, "", &[("Origin", "http://evil.example")]).is_err());
     let own = format!("http://{}", serving.address);
     assert!(Viewer::connect(&serving, "", &[("Origin", &own)]).is_ok());
-    assert_eq!(status("POST", "/actions/mark", &[]), 403, "a replay takes no commands");
+    assert_eq!(status("POST", "/actions/mark", &[]), 403, "a replay accepts no commands");
 }
 
 #[test]

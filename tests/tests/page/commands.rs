@@ -16,7 +16,7 @@ fn acknowledgements_and_notes_reach_other_viewers_and_the_log() {
     other.until_type("ready");
     assert_eq!(one.hello["may"], json!({"operate": true, "playback": false}));
     let needs = |viewer: &Viewer| viewer.alerts.values().any(|alert| alert["needs_acknowledgement"] == true);
-    one.until("an alert that needs it", needs);
+    one.until("an alert that requires acknowledgement", needs);
     one.send(&acknowledge_all("AB"));
     one.send(&json!({"do": "note", "text": "rubble left", "by": "AB"}));
     let by = |viewer: &Viewer| viewer.alerts.values().any(|alert| alert["acknowledged"]["by"] == "AB");

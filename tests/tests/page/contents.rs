@@ -1,4 +1,4 @@
-//! Data sent to viewers: the loop's own results, complete or as changes since a lost connection.
+//! Data sent to viewers. These are the loop's own results, either all of them or the changes since a lost connection.
 
 use headrace_tests::Folder;
 use headrace_tests::page_client::{Serving, Viewer};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::ANY;
 
-/// Replays the short dive with a page, paused at its end.
+/// Replays the short dive with a page. Playback pauses at the end of the log.
 fn replayed(folder: &Folder) -> (Serving, Viewer) {
     replayed_with(folder, &[])
 }
@@ -92,7 +92,7 @@ fn dive_is_compared_with_a_second_target() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed_with(&folder, &["--target", "0.5,0.2"]);
     assert_eq!(viewer.hello["compared_m"], 0.2);
-    // Sections behind a moving vehicle are judged at once, not only at the end.
+    // Sections behind a moving vehicle must be judged at once, not only at the end.
     let judged =
         |viewer: &Viewer| viewer.sections.values().filter(|section| section.compared == Some(2)).count();
     assert!(judged(&viewer) > 3, "{:?}", viewer.sections);
@@ -110,8 +110,8 @@ fn dive_is_compared_with_a_second_target() {
         assert!((shown_m - summed_m).abs() < 1e-6, "{key}: {shown_m}, {summed_m}");
         apart_m += (shown_m - reported_m).abs() / 2.0;
     }
-    // The page compares the dive's own holes, and the report comes from a separate replay. They differ at the ends of
-    // the covered stretch.
+    // The page judges the holes of this dive by the second target, but the report replays the dive for it. The two
+    // differ at the ends of the covered stretch.
     let way_m = report["coverage_extent"]["length_m"].as_f64().unwrap();
     assert!(
         apart_m <= 0.2 * way_m,
@@ -126,9 +126,10 @@ fn dive_is_compared_with_a_second_target() {
 fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
     let folder = Folder::with_dive();
     let (serving, mut lost) = replayed(&folder);
-    // A seek shows less and starts another instance. The connection is lost after it, while the dive goes on.
+    // A seek back starts another instance with fewer sections. The connection is lost afterwards, while the dive goes
+    // on.
     let [from_s, to_s] = span_s(&lost);
-    // Late, so that a part of the tunnel has final verdicts.
+    // The time is late in the dive, so that a part of the tunnel has final verdicts.
     let middle_s = to_s - 0.1 * (to_s - from_s);
     lost.send(&json!({"do": "play", "command": "pause"}));
     lost.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
@@ -179,7 +180,7 @@ fn samples_arrive_by_chainage_and_survive_seeks() {
     assert!(whole > 1000, "{whole}");
     let [from_s, to_s] = span_s(&viewer);
     let middle_s = f64::midpoint(from_s, to_s);
-    // Otherwise it plays on from there, faster than states are sent.
+    // Without the pause, playback would go on from there faster than states are sent.
     viewer.send(&json!({"do": "play", "command": "pause"}));
     viewer.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
     viewer.until("the jump back", |viewer| viewer.state["now_s"].as_f64() < Some(middle_s + 0.1));
@@ -197,8 +198,8 @@ fn samples_arrive_by_chainage_and_survive_seeks() {
     end(serving, &mut viewer);
 }
 
-/// Fields of Cockpit's page "External Integrations" (May 2026). A field that is missing, null or of another type
-/// makes Cockpit discard the whole file.
+/// Fields of Cockpit's page "External Integrations" (May 2026). If a field is missing, null or of another type,
+/// Cockpit discards the whole file.
 fn is_what_cockpit_accepts(extras: &Value) {
     let texts = |of: &Value, keys: &[&str]| {
         for key in keys {
@@ -235,7 +236,7 @@ fn is_what_cockpit_accepts(extras: &Value) {
 }
 
 #[test]
-fn other_programs_can_read_lines_state_and_metrics() {
+fn other_programs_can_read_widgets_state_schema_and_metrics() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
     let (_, extras) = serving.ask("GET", "/cockpit_extras.json", &[], "");
@@ -244,13 +245,15 @@ fn other_programs_can_read_lines_state_and_metrics() {
     let icon = extras["widgets"][0]["iconUrl"].as_str().unwrap();
     let (status, picture) = serving.ask("GET", &icon[icon.find("/assets").unwrap()..], &[], "");
     assert!(status == 200 && picture.contains("<svg"), "{icon}: {status}");
-    // The dive goes on meanwhile until the end of the log; then both have its last state.
+    // The dive goes on to the end of the log meanwhile, and then both sides have its last state.
     loop {
         let (status, answer) = serving.ask("GET", "/state.json", &[], "");
         let body = answer.split("\r\n\r\n").nth(1).unwrap();
         let state: Value = serde_json::from_str(body).unwrap();
         assert_eq!(status, 200);
-        viewer.until("as new a state", |viewer| viewer.state["at_s"].as_f64() >= state["at_s"].as_f64());
+        viewer.until("a state that is as new", |viewer| {
+            viewer.state["at_s"].as_f64() >= state["at_s"].as_f64()
+        });
         if viewer.state["at_s"] == state["at_s"] {
             assert_eq!(viewer.state["position"], state["position"]);
             break;

@@ -1,4 +1,5 @@
-//! The operator's page over real sockets: its data, its access rights, and its lack of influence on the dive.
+//! The operator's page over real sockets. Checks its data, its access rights, and that the page doesn't influence the
+//! dive.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]

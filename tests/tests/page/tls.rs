@@ -1,8 +1,9 @@
-//! The page over TLS with certificate files: only clients with TLS and a token are served, and unusable files are
+//! The page over TLS with certificate files. Only clients with TLS and a token are served, and unusable files are
 //! reported.
 //!
-//! `certificates/` has a certificate for `localhost` and 127.0.0.1 until 2126, its key, and an unrelated key, for
-//! tests alone (`openssl ecparam -name prime256v1 -genkey`, `openssl req -x509` without a CA's rights).
+//! `certificates/` has a certificate for `localhost` and 127.0.0.1 until 2126, its key, and another key that doesn't
+//! match. All files are for tests alone (`openssl ecparam -name prime256v1 -genkey`, `openssl req -x509` without a
+//! CA's rights).
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -36,7 +37,7 @@ fn text(name: &str) -> String {
     file(name).display().to_string()
 }
 
-/// Starts a replay whose page has tokens and the certificate.
+/// Starts a replay with a page that has tokens and the certificate.
 fn serving(folder: &Folder) -> Serving {
     folder.write("tokens", TOKENS);
     let (certificate, key) = (text("server.cert.pem"), text("server.key.pem"));
@@ -44,7 +45,7 @@ fn serving(folder: &Folder) -> Serving {
     Serving::start(folder, &[&["replay", "dive.mcap", ANY], files.as_slice()].concat())
 }
 
-/// A connection of a client that trusts the test's certificate, or none.
+/// A connection of a client. The client trusts either the test's certificate or no certificate.
 fn secured(address: &str, trusts: bool) -> Secured {
     let mut roots = RootCertStore::empty();
     if trusts {
@@ -118,7 +119,7 @@ fn client_without_tls_gets_nothing_and_blocks_nobody() {
     let folder = Folder::with_dive();
     let serving = serving(&folder);
     let address = serving.address.as_str();
-    // This client begins no handshake and stays connected.
+    // This client stays connected, but never begins a handshake.
     let silent = TcpStream::connect(address).unwrap();
     for (path, token) in [("/", None), ("/state.json", Some(TOKEN))] {
         let mut plain = TcpStream::connect(address).unwrap();
@@ -128,7 +129,7 @@ fn client_without_tls_gets_nothing_and_blocks_nobody() {
             .write_all(format!("GET {path} HTTP/1.1\r\nHost: {address}\r\n{token}\r\n\r\n").as_bytes())
             .unwrap();
         let mut answer = Vec::new();
-        // The connection may be reset, with unread data.
+        // Unread data may make the server reset the connection.
         let _reset = plain.read_to_end(&mut answer);
         assert!(answer.len() < 16 && !answer.starts_with(b"HTTP"), "{answer:?}");
     }

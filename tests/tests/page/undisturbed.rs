@@ -1,4 +1,5 @@
-//! Viewers don't influence the dive: its results are the same with a stalled viewer, a flooding viewer, and none.
+//! Viewers don't influence the dive. The results are the same with a stalled viewer, with a flooding viewer, and
+//! without viewers.
 
 use std::net::TcpListener;
 
@@ -15,7 +16,7 @@ fn stalled_and_flooding_viewers_do_not_change_results() {
     let bare = folder.headrace(&["demo", "--speed", "max", "--out", "bare"]);
     assert_eq!(bare.code, Some(0), "{}", bare.stderr);
     let serving = Serving::start(&folder, &["demo", ANY, "--no-open", "--speed", "400x", "--out", "watched"]);
-    // Connected, but never read from.
+    // This viewer is connected, but never reads.
     let _stalled: Vec<Viewer> = (0..8).map(|_| Viewer::connect(&serving, "", &[]).unwrap()).collect();
     let mut flooding = Viewer::connect(&serving, "", &[]).unwrap();
     while flooding.send_raw(Message::Text("x".repeat(4000).into())).is_ok() {}
@@ -32,7 +33,7 @@ fn stalled_and_flooding_viewers_do_not_change_results() {
 fn stalled_viewer_is_dropped_and_counted_and_others_are_served() {
     let folder = Folder::with_dive();
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY]);
-    // Connected, but never read from.
+    // This viewer is connected, but never reads.
     let _stalled = Viewer::connect(&serving, "", &[]).unwrap();
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
     viewer.until("the end of the log", |viewer| viewer.state["playback"]["paused"] == true);
@@ -42,7 +43,8 @@ fn stalled_viewer_is_dropped_and_counted_and_others_are_served() {
         let line = figures.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
         line.unwrap().parse::<u64>().unwrap()
     };
-    // Each seek sends the whole dive again and fills the viewer's socket buffer; then ten seconds pass.
+    // Each seek sends the whole dive again, which fills the socket buffer of the stalled viewer. Ten seconds later,
+    // the viewer is dropped.
     let to_s = viewer.state["playback"]["to_s"].as_f64().unwrap();
     for jump in 0..600 {
         let to_s = to_s - f64::from(jump % 2) * 2.0;

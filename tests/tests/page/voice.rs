@@ -1,4 +1,4 @@
-//! Voice notes: the loop keeps the note, the log keeps the recording, and neither needs the other.
+//! Voice notes. The loop keeps the note and the log keeps the recording, and each works without the other.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -16,22 +16,23 @@ const OPERATOR: &str = "Authorization: Bearer operator-0123456789abcdef";
 const WEBM: &str = "Content-Type: audio/webm;codecs=opus";
 const LOG: &str = "headrace-demo/dive.mcap";
 
-/// A recording that resembles a browser's in every checked respect; it isn't compressible.
+/// A recording that has all checked properties of a browser's recording. Its content is random, so it can't be
+/// compressed.
 fn webm(seed: u64, bytes: usize) -> Vec<u8> {
     let mut random = Random(seed);
     let noise = (4..bytes).map(|_| random.byte());
     [0x1a, 0x45, 0xdf, 0xa3].into_iter().chain(noise).collect()
 }
 
-/// A demonstration that runs until it is stopped.
+/// A demonstration that runs until the test stops it.
 fn demo(folder: &Folder, further: &[&str]) -> Serving {
     Serving::start(folder, &[&["demo", ANY, "--no-open", "--speed", "30x"], further].concat())
 }
 
-/// Begins a voice note, and waits until the page's server knows it.
+/// Begins a voice note and waits until the server of the page has confirmed it.
 fn begin(viewer: &mut Viewer, id: u32) {
     viewer.send(&json!({"do": "voice", "id": id, "by": "AB"}));
-    viewer.until("that it is done", |viewer| {
+    viewer.until("confirmation of the voice note", |viewer| {
         viewer.others.iter().any(|other| other["type"] == "done" && other["do"] == "voice")
     });
 }
@@ -53,7 +54,7 @@ fn interrupt(serving: Serving, viewer: &mut Viewer) -> Value {
     end
 }
 
-/// Recordings in a log: id, and the bytes after the header.
+/// Voice recordings in a log: id of the note, and the bytes after the header.
 fn recordings(folder: &Folder, logs: &[&str]) -> Vec<(u32, Vec<u8>)> {
     let files: Vec<_> = logs.iter().map(|log| folder.path(log)).collect();
     let mut log = DiveLog::open(&files).unwrap();
@@ -68,7 +69,7 @@ fn recordings(folder: &Folder, logs: &[&str]) -> Vec<(u32, Vec<u8>)> {
     found
 }
 
-/// Whether any decompressed message of a log contains these bytes.
+/// Whether a message of a log contains these bytes after decompression.
 fn mentions(folder: &Folder, log: &str, words: &str) -> bool {
     let mut log = DiveLog::open(&[folder.path(log)]).unwrap();
     let mut is_found = false;
@@ -78,7 +79,7 @@ fn mentions(folder: &Folder, log: &str, words: &str) -> bool {
     is_found
 }
 
-/// The same log without its recordings.
+/// Copies a log without its voice recordings.
 fn without_voices(folder: &Folder, from: &str, to: &str) {
     let files = [folder.path(from)];
     let mut keep_all = |_: u16, _: &[u8], _: &mut Vec<u8>| false;
@@ -117,7 +118,7 @@ fn voice_note_has_its_start_time_and_its_bytes_in_the_log() {
         assert_eq!(ended[key], begun[key], "{key}");
     }
     assert_eq!(serving.get("/voice/7"), audio);
-    assert_eq!(upload(&serving, 7, &[], &audio).0, 200, "sent again, as its answer was lost");
+    assert_eq!(upload(&serving, 7, &[], &audio).0, 200, "sent again, because the answer was lost");
     let mut late = Viewer::connect(&serving, "", &[]).unwrap();
     late.until_type("ready");
     assert_eq!(
@@ -141,16 +142,16 @@ fn voice_note_has_its_start_time_and_its_bytes_in_the_log() {
     assert_eq!(folder.headrace(&["recover", LOG, "-o", "recovered.mcap"]).code, Some(0));
     assert_eq!(recordings(&folder, &["recovered.mcap"]), [(7, audio.clone())]);
     assert_eq!(folder.headrace(&["trim", LOG, "--anonymise", "-o", "public.mcap"]).code, Some(0));
-    assert_eq!(recordings(&folder, &["public.mcap"]), [], "a voice identifies its speaker");
+    assert_eq!(recordings(&folder, &["public.mcap"]), [], "a voice identifies its speaker, so it is removed");
     assert!(!mentions(&folder, "public.mcap", "\"AB\""), "names of note takers are removed");
-    assert!(mentions(&folder, LOG, "\"AB\""), "else the line above says nothing");
+    assert!(mentions(&folder, LOG, "\"AB\""), "otherwise the check above proves nothing");
 
     let replay = Serving::start(&folder, &["replay", LOG, ANY]);
     let mut viewer = Viewer::connect(&replay, "", &[]).unwrap();
     viewer.until("the note", |viewer| note(viewer, 7).is_some_and(|note| note["voice"]["seconds"] == 12));
     assert_eq!(replay.get("/voice/7"), audio);
     assert_eq!(replay.ask("GET", "/voice/8", &[], "").0, 404);
-    assert_eq!(upload(&replay, 7, &[], &audio).0, 403, "a replay takes none");
+    assert_eq!(upload(&replay, 7, &[], &audio).0, 403, "a replay accepts no voice note");
 
     let exported = folder.headrace(&["export", LOG, "--html", "dive.html"]);
     assert!(!exported.stdout.contains("left out"), "{}", exported.stdout);
@@ -158,8 +159,8 @@ fn voice_note_has_its_start_time_and_its_bytes_in_the_log() {
         folder.headrace(&["export", "silent.mcap", "--html", "silent.html"]);
         folder.read("silent.html").len()
     });
-    // Base64, compressed, and base64 again.
-    assert!(spoken > silent + audio.len(), "{spoken} and {silent} bytes: the page has the voice in it");
+    // In the page, the recording is base64, then compressed, and then base64 again.
+    assert!(spoken > silent + audio.len(), "{spoken} and {silent} bytes: the page doesn't contain the voice");
 }
 
 #[test]
@@ -245,7 +246,7 @@ fn voice_recording_needs_an_operator_and_a_begun_note() {
     let chunked = [b"80001\r\n".to_vec(), webm(4, 0x8_0001), b"\r\n".to_vec()].concat();
     let headers = [OPERATOR, WEBM, "Transfer-Encoding: chunked"];
     assert_eq!(serving.ask("POST", "/voice/9?seconds=12", &headers, chunked).0, 413);
-    assert_eq!(upload(&serving, 9, &[OPERATOR], &audio).0, 200, "none of these took its place");
+    assert_eq!(upload(&serving, 9, &[OPERATOR], &audio).0, 200, "no refused recording replaced the note");
     assert_eq!(upload(&serving, 9, &[OPERATOR], &webm(5, 2000)).0, 409, "it has its recording");
     assert_eq!(serving.ask("GET", "/voice/9", &[], "").0, 401);
     viewer.until("its length", |viewer| note(viewer, 9).is_some_and(|note| note["voice"]["seconds"] == 12));
@@ -256,7 +257,7 @@ fn voice_recording_needs_an_operator_and_a_begun_note() {
     let flood: Vec<u16> = (0..20).map(|id| upload(&serving, 100 + id, &[OPERATOR], &audio).0).collect();
     assert_eq!(flood.last(), Some(&429));
     viewer.send(&json!({"do": "mark", "by": "AB"}));
-    viewer.until("that the page goes on", |viewer| viewer.others.iter().any(|other| other["do"] == "mark"));
+    viewer.until("the page goes on", |viewer| viewer.others.iter().any(|other| other["do"] == "mark"));
     interrupt(serving, &mut viewer);
     assert_eq!(recordings(&folder, &[LOG]), [(9, audio)]);
 }
@@ -285,7 +286,7 @@ fn damaged_voice_note_loses_only_itself() {
     let end = interrupt(serving, &mut viewer);
     let mut log = folder.read(LOG);
     let piece = &audio[50_000..50_032];
-    let at = log.windows(32).position(|window| window == piece).expect("noise is stored as it is");
+    let at = log.windows(32).position(|window| window == piece).expect("noise is stored uncompressed");
     log[at] ^= 1;
     folder.write("damaged.mcap", log);
     let (code, replayed) = folder.replay("damaged.mcap", &[]);
@@ -301,7 +302,7 @@ fn damaged_voice_note_loses_only_itself() {
 }
 
 #[test]
-fn voice_note_is_in_the_part_of_its_time() {
+fn voice_note_is_in_the_log_part_of_its_time() {
     let folder = Folder::with_dive();
     std::fs::create_dir(folder.path("parts")).unwrap();
     let arguments = ["run", "vehicle.toml", ANY, "--record", "parts/dive.mcap", "--rotate", "1s"];
@@ -318,9 +319,9 @@ fn voice_note_is_in_the_part_of_its_time() {
     };
     let audio = [webm(1, 90_000), webm(2, 90_000)];
     speak(7, &audio[0]);
-    // No device is connected, so only operator commands are recorded.
+    // No device is connected, so the dive records nothing but operator commands.
     while !folder.path("parts/dive.part002.mcap").exists() {
-        // The largest rate that is allowed for an operator.
+        // This is the largest rate that an operator is allowed.
         let (status, answer) = serving.ask("POST", "/actions/silence", &[], "{}");
         assert!([200, 429].contains(&status), "{answer}");
     }

@@ -1,4 +1,4 @@
-//! `headrace devices`: identifies emulated devices on real ports, and reports missing ones with a remedy.
+//! `headrace devices` identifies emulated devices on real ports. It reports missing devices with a remedy.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
@@ -17,12 +17,12 @@ use serde_json::Value;
 
 const KINDS: [&dyn DeviceKind; 2] = [&headrace_imagenex881::Imagenex881Kind, &headrace_ping1d::Ping1dKind];
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
-/// Number of requests before a device counts as silent.
+/// Number of requests without an answer after which a device counts as silent.
 const TRIES: u32 = 30;
 const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"slow\"\nrange_m = 10\nhead_id = 0x12";
 const PING: &str = "plugin = \"ping1d\"\ndevice_id = 7";
 
-/// A vehicle file of sensors with these keys, each with its address.
+/// A vehicle file with these sensors, each given as an address and the keys of its table.
 fn vehicle_text(sensors: &[(&str, String)]) -> String {
     let mut text =
         include_str!("../../../deploy/vehicles/pipe.toml").split("[[sensors]]").next().unwrap().to_owned();
@@ -42,7 +42,7 @@ fn emulator(keys: &str) -> Emulated {
     vehicle.sensors[0].emulator(&EmulatorSetup { start, head: None, site: Site::default(), polled: false })
 }
 
-/// A device on a line; it runs until it is dropped.
+/// A device on a line. It runs until this value is dropped.
 struct Device {
     connect: Connect,
     stopping: Arc<AtomicBool>,
@@ -50,7 +50,7 @@ struct Device {
 }
 
 impl Device {
-    /// Starts a device; `answer` gets the host's bytes and returns the reply.
+    /// Starts a device. `answer` gets the bytes of the host and returns the reply.
     fn new(carrier: Carrier, mut answer: impl FnMut(&[u8]) -> Vec<Vec<u8>> + Send + 'static) -> Self {
         let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         let (connect, stopping) = (stand.connect().clone(), Arc::new(AtomicBool::new(false)));
@@ -105,7 +105,7 @@ fn asked(device: &Device) -> Answer {
     probe(&device.connect, &mut probes()).unwrap()
 }
 
-/// Identity of a device, with retries if the machine is too busy for an answer in time.
+/// Identity of a device. The request is repeated if the machine is too busy for an answer in time.
 fn identity(device: &Device) -> Option<String> {
     (0..TRIES).find_map(|_| match asked(device) {
         Answer::Is(identity) => Some(identity),
@@ -131,7 +131,7 @@ fn devices_on_real_ports_are_identified() {
             ),
         ] {
             let device = Device::emulated(carrier, keys);
-            // Twice, because a probe must leave the line as it was.
+            // The device is probed twice, because a probe must leave the line unchanged.
             for _ in 0..2 {
                 let identity = identity(&device).unwrap_or_else(|| panic!("{carrier:?}: {words}: no answer"));
                 assert!(identity.starts_with(words), "{carrier:?}: {identity}");

@@ -1,7 +1,7 @@
-//! Devices on real ports whose lines fail: unplugged, garbled, stalled, or with the wrong device.
+//! Devices on real ports with faulty lines: unplugged, garbled, stalled, or connected to the wrong device.
 //!
-//! Every frame that a device sent whole is used, the device is used again without help, the fault is reported in
-//! words, and no other sensor is disturbed.
+//! Every frame that a device sent whole is used. After the fault the device is used again without help. The fault is
+//! reported in words, and no other sensor is disturbed.
 
 use std::os::unix::fs::PermissionsExt as _;
 
@@ -21,19 +21,18 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
 }
 
-/// Statuses caused by a busy machine at the other end, which the tests ignore.
+/// Statuses that a busy machine may cause at the other end. The tests ignore them.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
     "wrong: falls behind because replies are lost",
     "silent: the line is open, but no frame has arrived yet",
 ];
 
-/// Statuses of a sensor without repetition, the same on a busy machine and on an idle one.
+/// Statuses of a sensor without repetitions. They are the same on a busy machine and on an idle one.
 fn words(said: &[String]) -> String {
     let mut all: Vec<String> = Vec::new();
     for status in said {
-        // Reading from an unplugged port gives another message than writing to it, and the machine decides which
-        // comes first.
+        // Reading from an unplugged port and writing to it give different messages, and either one may come first.
         let status = status.replace("the port is gone", "Broken pipe");
         let is_news = status != "running" && !OF_A_BUSY_MACHINE.iter().any(|begin| status.starts_with(begin));
         if is_news && !all.contains(&status) {
@@ -43,8 +42,8 @@ fn words(said: &[String]) -> String {
     all.join("\n")
 }
 
-/// A device that is unplugged within an answer, noticed as missing, and plugged in and used again, twice. Returns the
-/// statuses.
+/// Unplugs a device in the middle of an answer, waits until it is reported missing, plugs it in, and waits until it
+/// is used again. Does this twice and returns the statuses.
 fn unplugged_and_plugged_in(text: &'static str, end: End, name: &str) -> String {
     let folder = Folder::new();
     let log = folder.path(&format!("{name}.mcap"));
@@ -98,7 +97,7 @@ fn replugged_echosounder_gets_its_settings_again() {
 }
 
 #[test]
-fn returning_bridge_is_used_again() {
+fn network_device_that_returns_is_used_again() {
     let mut rig = Rig::new(vec![sensor(PING, End::udp(), Healthy), healthy()]);
     rig.more(0, 40);
     rig.control(0).unplug();
@@ -142,7 +141,8 @@ fn device_plugged_in_later_is_used() {
     "#);
 }
 
-/// An echosounder and a head on garbled lines, then on sound ones, beside a sensor that must not be disturbed.
+/// An echosounder and a head on lines that are garbled at first and sound later, beside a sensor that must not be
+/// disturbed.
 fn garbled(change: fn(&mut Random, &[u8]) -> Vec<u8>) {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-ping-port0");
@@ -177,7 +177,7 @@ fn lost_bytes_lose_only_their_own_frames() {
     garbled(thinned);
 }
 
-/// Garbage between frames, with frame headers in it that promise more bytes.
+/// Garbage between frames. It contains frame headers that promise more bytes.
 fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
     let mut random = Random(seed);
     EachFrame(move |_, frame: &[u8], line: &mut Wire| {
@@ -194,7 +194,7 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 #[test]
 fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // A profile of 1200 strengths, and a return of 500 points.
+    // The headers in the garbage promise a profile of 1200 strengths and a return of 500 points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),
@@ -213,7 +213,8 @@ fn bursts_of_garbage_lose_no_frame() {
     ended.untroubled(2);
 }
 
-/// Stalls in every third frame: shorter than the usual pause, longer, or for ever.
+/// Stalls in the middle of every third frame. The stall is shorter than the usual pause, longer than it, or lasts for
+/// ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);
@@ -281,7 +282,7 @@ fn two_answers_to_one_request_are_two_readings() {
     assert_eq!(depth.withheld, 0, "the calibration is whole before the first measurement: {depth:?}");
 }
 
-/// A device that claims to be another one until it is healed.
+/// A device that claims to be another one until its fault ends.
 struct Disguised(fn(&mut Vec<u8>));
 
 impl Fault for Disguised {
@@ -292,7 +293,7 @@ impl Fault for Disguised {
     }
 }
 
-/// Changes an echosounder's identity to a Ping360.
+/// Changes the identity of an echosounder to that of a Ping360.
 fn as_ping360(frame: &mut Vec<u8>) {
     use headrace_ping1d::codec::{Addressed, Frame, Message};
     let parsed = Frame::parse(frame).unwrap();
@@ -304,7 +305,7 @@ fn as_ping360(frame: &mut Vec<u8>) {
     }
 }
 
-#[expect(clippy::ptr_arg, reason = "other disguises change the length")]
+#[expect(clippy::ptr_arg, reason = "the replacement must have the same length")]
 fn as_head_0x11(frame: &mut Vec<u8>) {
     frame[3] = 0x11;
 }
@@ -381,7 +382,7 @@ fn silent_device_is_reported_and_used_when_it_returns() {
     rig.until("it runs", |view| view.phases[0] == Some(Phase::Running));
     rig.control(0).fall_silent();
     rig.says(0, "is it switched on?");
-    // Its line has been reopened since, and it is still silent.
+    // The line has been reopened, but the device is still silent.
     rig.until("enough", |view| view.good[1] >= 600);
     assert_ne!(rig.view().phases[0], Some(Phase::Running), "{:?}", rig.view().said[0]);
     rig.control(0).speak();
@@ -396,7 +397,7 @@ fn silent_device_is_reported_and_used_when_it_returns() {
     "#);
 }
 
-/// Loses the first requests of the host.
+/// Loses the host's first requests.
 struct DeafAtFirst(usize);
 
 impl Fault for DeafAtFirst {
@@ -409,7 +410,7 @@ impl Fault for DeafAtFirst {
     }
 }
 
-/// Each waits for an answer that doesn't arrive, and sends nothing while the other waits.
+/// Each device waits for an answer that doesn't arrive, and sends nothing while the other device waits.
 #[test]
 fn two_devices_on_a_line_with_lost_first_answers_wait_one_answer_timeout() {
     let end = End::tcp();

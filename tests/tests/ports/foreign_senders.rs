@@ -1,5 +1,5 @@
-//! `headrace run` with foreign senders: open ports, other systems, two sensors on one device, and logs of older
-//! firmware.
+//! `headrace run` with foreign senders: open ports, other MAVLink systems, two sensors on one device, and logs of
+//! older firmware.
 
 use std::net::UdpSocket;
 use std::os::unix::fs::symlink;
@@ -41,8 +41,10 @@ fn report(folder: &Folder) -> Value {
     serde_json::from_slice(&folder.read("report.json")).unwrap()
 }
 
-/// A dive on a local port with a device and a stranger. The first frames come from another system; the device sends
-/// once the host has spoken to it. Returns the report and the number of recorded pressures.
+/// A dive on a local port with a device and a foreign sender.
+///
+/// The first frames come from another system. The device sends after the host has sent to it. Returns the report and
+/// the number of recorded pressures.
 fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     let folder = Folder::new();
     let place = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
@@ -64,7 +66,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     let (answer, report) = thread::scope(|scope| {
         scope.spawn(|| {
             until_end(&|| {
-                // Errors occur as long as the port isn't open.
+                // Sending fails until the port is open.
                 device.send_to(&[heartbeat(1), pressure(1, TRUE_HPA)].concat(), place).unwrap_or_default();
                 let heard = device.recv(&mut [0; 300]).is_ok_and(|count| count > 0);
                 known.fetch_or(heard, Ordering::Relaxed);
@@ -79,7 +81,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
                 };
                 stranger.send_to(&told, place).unwrap_or_default();
                 stranger.send_to(b"x", place).unwrap_or_default();
-                assert!(stranger.recv(&mut [0; 300]).is_err(), "the host has spoken to a stranger");
+                assert!(stranger.recv(&mut [0; 300]).is_err(), "the host has sent to the foreign sender");
             });
         });
         let arguments = ["vehicle.toml", "--record", "dive.mcap", "--require", "all"];
@@ -90,7 +92,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
         ended.store(true, Ordering::Relaxed);
         dived
     });
-    // A depth sensor alone gives no position.
+    // A depth sensor alone can't give a position.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     assert!(answer.stdout.contains("on the line of depth came from other devices"), "{}", answer.stdout);
     let log = folder.read("dive.mcap");
@@ -117,7 +119,7 @@ fn open_port_accepts_only_the_first_autopilot() {
     }
 }
 
-/// Statuses of two sensors of these `connect`s.
+/// Statuses of two sensors with these values of `connect`.
 fn two(folder: &Folder, connects: [&str; 2]) -> Vec<Value> {
     let sensor = |(id, connect): (&str, &str)| {
         format!("\n[[sensors]]\nid = \"{id}\"\nconnect = \"{connect}\"\n{HEAD}")

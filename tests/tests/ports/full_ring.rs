@@ -1,4 +1,4 @@
-//! A full ring loses packets: exactly the lost ones are counted.
+//! A full ring loses packets, and the number of lost packets is exact.
 
 use std::net::UdpSocket;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 use headrace_sensor::reading::{Decoded, Packet};
 use headrace_vehicle::Mission;
 
-/// Decoder that decodes nothing.
+/// A decoder that decodes nothing.
 struct Nothing;
 
 impl Stateful for Nothing {
@@ -70,7 +70,7 @@ fn exactly_the_packets_without_room_are_counted() {
     let navigation = DirectNavigation::new(profile.clone(), Site::default());
     let mut app = App::new(Mission::new(profile, 1.0));
     let [id, plugin, connect] = ["flood", "none", "none"].map(str::to_owned);
-    // The smallest ring has room for one packet of the longest kind.
+    // The smallest ring has room for exactly one packet of the longest kind.
     app.add_source(SourceSpec { id, plugin, connect, decoder: Box::new(Nothing), ring_bytes: 0 }).unwrap();
     let mut dive = app.arm(Box::new(navigation)).unwrap();
     let ours = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -84,8 +84,8 @@ fn exactly_the_packets_without_room_are_counted() {
         driver: Box::new(Counting(count.clone())),
     };
     let supervisor = Supervisor::start(vec![connection], None).unwrap();
-    // No tick empties the ring meanwhile. Datagrams before the port is open, or dropped by the kernel, aren't
-    // received.
+    // No tick empties the ring in this time. Datagrams aren't received if the port isn't open yet or the kernel drops
+    // them.
     let device = UdpSocket::bind("127.0.0.1:0").unwrap();
     while count.load(Ordering::Acquire) < 20 {
         device.send_to(&[7; 1000], place).unwrap();

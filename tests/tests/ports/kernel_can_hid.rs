@@ -1,7 +1,7 @@
 //! Linux's own behaviour on which the drivers rely: CAN interfaces that go down, and counters that are unplugged.
 //!
-//! CAN interfaces and `/dev/uhid` need root and modules. So these tests are ignored here and run on a virtual
-//! machine's kernel: `tests/vm/run -- PROGRAM kernel_can_hid:: --ignored --test-threads=1`, where PROGRAM is the
+//! CAN interfaces and `/dev/uhid` need root and modules. So these tests are ignored by default and run on the kernel
+//! of a virtual machine: `tests/vm/run -- PROGRAM kernel_can_hid:: --ignored --test-threads=1`, where PROGRAM is the
 //! built `ports` test. `.ci/run` does so.
 
 use std::fs::File;
@@ -17,7 +17,7 @@ use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions, Stand
 
 /// Longest wait for expected data.
 const LONG: Duration = Duration::from_secs(10);
-/// Wait for data that must not arrive.
+/// Time to wait for data that must not arrive.
 const SHORT: Duration = Duration::from_millis(100);
 
 const ENODEV: i32 = 19;
@@ -26,13 +26,13 @@ const ENETDOWN: i32 = 100;
 const VENDOR_ID: u16 = 0x1209;
 const PRODUCT_ID: u16 = 0x0001;
 
-/// Runs `ip link ...` with words separated by spaces.
+/// Runs `ip link` with these words, which are separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
 }
 
-/// A virtual CAN interface of this test, removed when dropped.
+/// A virtual CAN interface for this test. It is removed when it is dropped.
 struct Interface(&'static str);
 
 impl Interface {
@@ -82,12 +82,12 @@ fn frame_carries_the_kernel_receive_time() {
     let (sender, stamped, plain) = (vcan.socket(), vcan.socket(), vcan.socket());
     stamped.set_recv_timestamp(true).unwrap();
 
-    // Whether a frame's timestamp precedes its reading. The kernel begins to stamp a moment after it is enabled;
-    // earlier frames get the time of reading.
+    // Whether the timestamp of a frame precedes its reading. The kernel begins to stamp frames a moment after this is
+    // enabled, and earlier frames get the time of reading.
     let stamped_early = |number| {
         let before = SystemTime::now();
         sender.write_frame(&frame(number)).unwrap();
-        // When one socket has the frame, the kernel has received it for the other, too.
+        // If one socket has received the frame, the kernel has also received it for the other socket.
         assert_eq!(plain.read_frame().unwrap().data(), [number, 2, 3]);
         let received_by = SystemTime::now();
         thread::sleep(Duration::from_millis(5));
@@ -99,13 +99,13 @@ fn frame_carries_the_kernel_receive_time() {
         println!("CAN: frame {number}: stamp {since_sent:?} after sending, {before_read:?} before reading");
         at <= received_by
     };
-    assert!((0..200).any(stamped_early), "the kernel stamps nothing");
-    assert!((200..220).all(stamped_early), "a frame is stamped when it is read");
+    assert!((0..200).any(stamped_early), "the kernel doesn't stamp frames");
+    assert!((200..220).all(stamped_early), "a frame is stamped only when it is read");
 }
 
 #[test]
 #[ignore = "needs a kernel with vcan: tests/vm/run"]
-fn can_reader_gets_one_down_error_and_frames_after_up() {
+fn can_reader_gets_one_error_at_down_and_frames_after_up() {
     let vcan = Interface::up("vcan6");
     let (sender, reader) = (vcan.socket(), vcan.socket());
 
@@ -160,7 +160,7 @@ fn uhid() -> File {
     File::options().read(true).write(true).open(PATH).unwrap_or_else(|error| panic!("{PATH}: {error}"))
 }
 
-/// A report of the reference layout with this count.
+/// A report in the reference layout with this count.
 fn report(count: i32) -> Vec<u8> {
     let mut report = vec![1, 42, 1];
     report.extend(count.to_le_bytes());
@@ -168,14 +168,14 @@ fn report(count: i32) -> Vec<u8> {
     report
 }
 
-/// The counter with this serial number in the kernel's present list.
+/// The counter with this serial number in the kernel's current list.
 fn listed(api: &mut HidApi, serial: &str) -> Option<DeviceInfo> {
     api.refresh_devices().unwrap();
     let ours = |device: &&DeviceInfo| (device.vendor_id(), device.product_id()) == (VENDOR_ID, PRODUCT_ID);
     api.device_list().filter(ours).find(|device| device.serial_number() == Some(serial)).cloned()
 }
 
-/// Waits until the kernel has created the counter's hidraw; returns the device and its path.
+/// Waits until the kernel has created the hidraw device of the counter. Returns the device and its path.
 fn open(api: &mut HidApi, serial: &str) -> (HidDevice, String) {
     for _ in 0..1000 {
         if let Some(found) = listed(api, serial)
@@ -188,7 +188,7 @@ fn open(api: &mut HidApi, serial: &str) -> (HidDevice, String) {
         }
         thread::sleep(Duration::from_millis(10));
     }
-    panic!("{serial} was plugged in and is not listed");
+    panic!("{serial} was plugged in but isn't listed");
 }
 
 fn read(device: &HidDevice) -> hidapi::HidResult<Vec<u8>> {
@@ -244,19 +244,19 @@ fn unplugged_counter_is_an_error_and_returns_under_another_number() {
     device.report(&report(7)).unwrap();
     assert_eq!(read(&reader).unwrap(), report(7));
 
-    // A blocked reader is woken.
+    // Unplugging wakes a blocked reader.
     let waiting = thread::spawn(move || (read(&reader).unwrap_err(), reader));
     let kernel = device.unplug().unwrap();
     let (error, reader) = waiting.join().unwrap();
     println!("HID: unplugged: {error:?}");
     assert!(error.to_string().contains("disconnected"), "{error}");
-    assert!(read(&reader).unwrap_err().to_string().contains("disconnected"), "the error stays");
+    assert!(read(&reader).unwrap_err().to_string().contains("disconnected"), "the error persists");
     assert!(listed(&mut api, "HR-0004").is_none());
     let missing = api.open_serial(VENDOR_ID, PRODUCT_ID, "HR-0004").unwrap_err();
     println!("HID: opening an absent device: {missing:?}");
     drop(reader);
 
-    // Another counter is plugged in meanwhile and takes the number.
+    // Before the counter returns, another counter is plugged in and takes its number.
     let _other = plug(uhid(), "HR-0005");
     let (_other_reader, other_path) = open(&mut api, "HR-0005");
     assert_eq!(other_path, first_path);
@@ -274,7 +274,7 @@ fn last_report_of_an_unplugged_counter_is_lost() {
     let mut device = plug(uhid(), "HR-0006");
     let (reader, _) = open(&mut api, "HR-0006");
     device.report(&report(1)).unwrap();
-    // Closing counts as unplugging, too.
+    // Closing the device counts as unplugging.
     drop(device);
     let error = read(&reader).unwrap_err();
     println!("HID: a report waited, the device went: {error:?}");

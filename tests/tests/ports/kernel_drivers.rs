@@ -1,8 +1,8 @@
 //! The CAN and HID drivers on a real kernel, with emulated devices.
 //!
-//! Everything sent is decoded. Interfaces and counters that disappear and return are used again while the other
-//! sensor goes on. They need a virtual machine's kernel, as `kernel_can_hid.rs`:
-//! `tests/vm/run --with target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
+//! All sent data is decoded. Interfaces and counters may disappear. They are used again when they return, while the
+//! other sensor goes on. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run
+//! --with target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -31,9 +31,9 @@ const TETHER: usize = 1;
 
 /// Longest wait for expected data.
 const LONG: DurNs = DurNs::from_millis(20_000);
-/// Silence after which a line has no more data.
+/// A line that is silent for this time has no more data.
 const SETTLED: DurNs = DurNs::from_millis(200);
-/// Messages sent at once: fewer than the kernel buffers for a counter.
+/// Number of messages sent at once, fewer than the kernel buffers for a counter.
 const BURST: usize = 20;
 
 const COUNTER: &str = "hid:1209:0001:HR-0001";
@@ -63,13 +63,13 @@ counts_per_metre = 2000
 const WAY: &str =
     "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 20\nspeed_mps = 0.2\n";
 
-/// Runs `ip link ...` with words separated by spaces.
+/// Runs `ip link` with these words, which are separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
 }
 
-/// A virtual CAN interface of this test, removed when dropped.
+/// A virtual CAN interface for this test. It is removed when it is dropped.
 struct Interface(&'static str);
 
 impl Interface {
@@ -91,7 +91,7 @@ fn counter(serial: &str) -> EmulatedPort {
     EmulatedPort::hid(&identity, &REFERENCE_DESCRIPTOR).unwrap()
 }
 
-/// Path that the kernel gives a counter.
+/// Path that the kernel gives to a counter.
 fn path(serial: &str) -> String {
     for _ in 0..1000 {
         let api = HidApi::new().unwrap();
@@ -101,10 +101,10 @@ fn path(serial: &str) -> String {
         }
         thread::sleep(Duration::from_millis(10));
     }
-    panic!("{serial} was plugged in and is not listed");
+    panic!("{serial} was plugged in but isn't listed");
 }
 
-/// An inertial unit and a counter on their lines, their supervisor, and a decoding loop.
+/// An inertial unit and a counter on their lines, their supervisor, and a loop that decodes their data.
 struct Rehearsal {
     supervisor: Supervisor,
     dive: Loop,
@@ -114,7 +114,7 @@ struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// Starts it; `change` may wrap each sensor's driver.
+    /// Starts the rehearsal. `change` may wrap the driver of each sensor.
     fn new(connects: [&str; 2], change: &dyn Fn(usize, Box<dyn Driver>) -> Box<dyn Driver>) -> Self {
         let scene = scenes::scene_from(WAY, &|_| Ok(TWO_SENSORS.as_bytes().to_vec()));
         let vehicle = &scene.vehicle;
@@ -141,12 +141,14 @@ impl Rehearsal {
             if let Some(message) = self.messages[source].pop_front() {
                 return message;
             }
-            let Some(message) = self.simulation.next_message() else { panic!("the way has ended") };
+            let Some(message) = self.simulation.next_message() else {
+                panic!("the simulated path has ended")
+            };
             self.messages[usize::from(message.source)].push_back(message.bytes.to_vec());
         }
     }
 
-    /// Runs the loop until `ended` returns true or the time is over; returns the last result of `ended`.
+    /// Runs the loop until `ended` returns true or the time is over. Returns the last result of `ended`.
     fn run(&mut self, time: DurNs, ended: &dyn Fn(&Loop, &[Status]) -> bool) -> bool {
         let until = now() + time;
         let has_ended = Cell::new(false);
@@ -164,7 +166,12 @@ impl Rehearsal {
 
     #[track_caller]
     fn wait(&mut self, what: &str, ended: &dyn Fn(&Loop, &[Status]) -> bool) {
-        assert!(self.run(LONG, ended), "{what}: not within {} s; {:?}", LONG.as_secs_f64(), self.said);
+        assert!(
+            self.run(LONG, ended),
+            "{what}: not reached within {} s; {:?}",
+            LONG.as_secs_f64(),
+            self.said
+        );
     }
 
     /// Waits until a sensor has this status.
@@ -180,7 +187,7 @@ impl Rehearsal {
         self.dive.decoder_counts()[source].good_frames
     }
 
-    /// Runs until a sensor's data has ended; returns the number of frames.
+    /// Runs until no more data of a sensor arrives; returns the number of frames.
     fn settle(&mut self, source: usize) -> u64 {
         loop {
             let good = self.good(source);
@@ -197,7 +204,7 @@ impl Rehearsal {
         }
     }
 
-    /// Sends to a sensor's driver until a message arrives; messages before the line is open are lost.
+    /// Sends messages to a sensor's driver until one arrives. Messages sent before the line is open are lost.
     #[track_caller]
     fn call(&mut self, source: usize, stand: &mut EmulatedPort) {
         let before = self.settle(source);
@@ -209,14 +216,14 @@ impl Rehearsal {
         }
     }
 
-    /// Sends `count` messages, and checks that exactly these are decoded.
+    /// Sends `count` messages and checks that all of them, and nothing else, are decoded.
     #[track_caller]
     fn exactly(&mut self, source: usize, stand: &mut EmulatedPort, count: usize) {
         let before = self.settle(source);
         self.exactly_after(before, source, stand, count);
     }
 
-    /// The same at once, with `before` messages decoded earlier.
+    /// As [`Self::exactly`], but without a wait before sending; `before` messages have already been decoded.
     #[track_caller]
     fn exactly_after(&mut self, before: u64, source: usize, stand: &mut EmulatedPort, count: usize) {
         for burst in (0..count).step_by(BURST) {
@@ -228,7 +235,7 @@ impl Rehearsal {
         assert_eq!(self.settle(source) - before, count as u64, "sensor {source}");
     }
 
-    /// Whether the sensor has been running without interruption.
+    /// Whether the sensor's line has never been interrupted.
     fn is_undisturbed(&self, source: usize) -> bool {
         let mut said = self.said.iter().filter(|status| status.source == source);
         said.all(|status| matches!(status.phase, Phase::Running | Phase::Silent))
@@ -265,7 +272,7 @@ fn every_frame_and_every_report_is_decoded() {
     assert!(histories.iter().all(|history| history.lost == 0), "{histories:?}");
 }
 
-/// A slow driver that notes the timestamp of each message and the time of its reading.
+/// A slow driver, which records the timestamp of each message and the time of reading it.
 struct Dawdler {
     driver: Box<dyn Driver>,
     noted: Arc<SegQueue<(MonoNs, MonoNs)>>,
@@ -326,7 +333,7 @@ fn late_read_does_not_change_a_frame_timestamp() {
         sent.since(begun).as_secs_f64() * 1e3
     );
     assert_eq!(all.len(), BURST);
-    // Two clocks are compared, and not at the same moment.
+    // The tolerance is needed because two clocks are compared, and are read at different moments.
     let slack = DurNs::from_millis(2);
     for (number, (stamp, read)) in all.iter().enumerate() {
         assert!(
@@ -357,7 +364,7 @@ fn can_interface_down_and_up_is_read_again_from_the_first_frame() {
             Phase::Closed,
             "opening vcan3: the interface is down; sudo ip link set vcan3 up",
         );
-        // Messages of the unit are lost meanwhile. The second outage is longer than the silence timeout.
+        // Meanwhile messages of the unit are lost. The second outage is longer than the silence timeout.
         rehearsal.send(IMU, &mut imu, 3);
         rehearsal.exactly(TETHER, &mut tether, 60);
         if round == 1 {
@@ -408,7 +415,7 @@ fn replugged_can_adapter_is_used_again() {
     rehearsal.send(IMU, &mut imu, 3);
     rehearsal.exactly(TETHER, &mut tether, 60);
     let vcan = Interface::up("vcan6");
-    // The other end, which existed before, goes on as well.
+    // The unit's end existed before the new interface, and continues to work.
     rehearsal.call(IMU, &mut imu);
     rehearsal.exactly(IMU, &mut imu, 100);
     rehearsal.wait_for(IMU, Phase::Running, "");
@@ -437,7 +444,7 @@ fn replugged_counter_is_used_again_under_another_number() {
     assert!(rehearsal.said.iter().any(lost), "{:?}", rehearsal.said);
     rehearsal.exactly(IMU, &mut imu, 100);
 
-    // Another counter takes its number. The first one gets a new number and is the only one that is read.
+    // Another counter takes the old number. The first counter gets a new number, and only this counter is read.
     let mut other = counter("HR-0002");
     assert_eq!(path("HR-0002"), first);
     let mut tether = counter("HR-0001");

@@ -1,4 +1,4 @@
-//! Devices on real ports: emulated ones, faulty lines, the kernel's own CAN and HID, and the way of their bytes to
+//! Devices on real ports: emulated devices, faulty lines, the kernel's own CAN and HID, and the transport of bytes to
 //! the loop.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]

@@ -1,5 +1,5 @@
-//! A rehearsal, `emulate` and `run` in two processes on pseudoterminals, TCP and UDP, compared with the scene's own
-//! replay.
+//! A rehearsal: `emulate` and `run` in two processes, connected by pseudoterminals, TCP and UDP. The dive is compared
+//! with the replay of its scene.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Four heads, two of them on serial lines, echosounders on both kinds of line, all others on UDP.
+/// Four heads, two of them on serial lines; echosounders on serial lines and on UDP; all other sensors on UDP.
 pub(crate) fn scene(distance_m: f64) -> String {
     let vehicle = headrace_tests::root().join("deploy/vehicles/vita2-4.toml");
     format!(
@@ -54,7 +54,7 @@ pub(crate) fn interrupt(child: &Child) {
     assert!(done.success());
 }
 
-/// A process that is ended with the test.
+/// A process that ends with the test.
 pub(crate) struct Running(pub(crate) Child);
 
 impl Drop for Running {
@@ -64,7 +64,7 @@ impl Drop for Running {
     }
 }
 
-/// Runs a live dive in a rehearsal; returns exit code and report.
+/// Runs a live dive with an emulator; returns exit code and report.
 fn live(folder: &Folder, scene: &Path) -> (Option<i32>, Value) {
     let emulate = headrace()
         .args(["emulate", "--stand", "0", "--linger", "30", "--out"])
@@ -118,26 +118,27 @@ fn replay(folder: &Folder, log: &Path, name: &str) -> (Option<i32>, Value) {
     (done.unwrap().code(), report(&folder.path(name)))
 }
 
-/// Sections by the chainage of their start, written in millimetres.
+/// Sections by the chainage of their start, as text in metres with three decimals.
 fn sections(report: &Value) -> BTreeMap<String, &Value> {
     let sections = report["sections"].as_array().unwrap().iter();
     sections.map(|section| (format!("{:9.3}", section["start_m"].as_f64().unwrap()), section)).collect()
 }
 
-/// Largest difference between holes of a live dive and of its scene's replay, m.
+/// Allowed difference between a hole in the live dive and in the replay of its scene, m.
 const APART_M: f64 = 0.12;
-/// Target of the scene, m, and the number of standard deviations of its confidence.
+/// Target of the scene, m. `CONFIDENCE_SD` is its confidence as a number of standard deviations.
 const TARGET_M: f64 = 0.7;
 const CONFIDENCE_SD: f64 = 2.0;
 
-/// Whether the margin of a passed section is less than that difference.
+/// Whether the margin of a passed section is less than [`APART_M`].
 fn is_near(section: &Value) -> bool {
     let of = |key: &str| section[key].as_f64().unwrap_or(f64::NAN);
     section["verdict"] == "pass" && TARGET_M - of("hole_m") - CONFIDENCE_SD * of("hole_sd_m") < APART_M
 }
 
-/// Differences between sections of the live dive and of its replay, without the last half metre. There, the last
-/// updates and turns decide how far the dive reaches and whether its last section is judged.
+/// Differences between sections of the live dive and of the replay, without the last 0.7 m.
+///
+/// At the end, the last updates and turns decide how far the dive reaches and whether its last section is judged.
 fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value>) -> Vec<String> {
     let last = live.keys().max().max(replay.keys().max()).unwrap();
     let last_m: f64 = last.trim().parse().unwrap();
@@ -151,8 +152,8 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
             continue;
         };
         let hole_m = |section: &Value| section["hole_m"].as_f64().unwrap_or(f64::NAN);
-        // Phases between heads differ by some millimetres of hole at most. A machine that stalls for a quarter of a
-        // second truly enlarges a hole.
+        // Different phases between the heads change a hole by some millimetres at most. But if the machine stalls for
+        // a quarter of a second, the hole truly becomes larger.
         let apart_m = (hole_m(ours) - hole_m(theirs)).abs();
         if apart_m > APART_M {
             different.push(format!("{start} m: holes are {apart_m:.3} m apart"));
@@ -160,7 +161,7 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
         let near = [ours, theirs].iter().any(|section| is_near(section));
         let (ours, theirs) = (&ours["verdict"], &theirs["verdict"]);
         println!("{start} m  live {ours}, replay {theirs}, holes {apart_m:.3} m apart");
-        // A section that barely passes in one dive may stay undecided in the other.
+        // A section that passes with a small margin in one dive may stay undecided in the other.
         let barely = near
             && [ours, theirs].contains(&&"pass".into())
             && [ours, theirs].contains(&&"cannot_say".into());
@@ -171,8 +172,10 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
     different
 }
 
-/// Rehearses a dive. Only if the machine keeps time do its lines stay open and its sections match the scene's replay.
-/// So `keeps_time` is only set in tests that have the machine to themselves.
+/// Rehearses a dive and compares it with its replay.
+///
+/// On a busy machine, lines may close and sections may differ. So `keeps_time` is set only in tests that have the
+/// machine to themselves.
 fn rehearse(distance_m: f64, keeps_time: bool) {
     let folder = Folder::new();
     let scene_file = folder.path("scene.toml");
@@ -192,19 +195,19 @@ fn rehearse(distance_m: f64, keeps_time: bool) {
     let different = differences(&ours, &theirs);
     assert!(different.is_empty() || !keeps_time, "{different:#?}");
     assert!(!ours.is_empty(), "no section was judged");
-    // The replay of the recording shows the same results.
+    // The replay of the recording must give the displayed results.
     let (again_code, again) = replay(&folder, &folder.path("live.mcap"), "again.json");
     assert_eq!((again_code, &again["digest"]), (code, &live["digest"]));
     assert_eq!(again["sections"], live["sections"]);
 }
 
-/// Forty seconds of motion.
+/// The vehicle moves for forty seconds.
 #[test]
-fn rehearsal_replays_as_it_was_seen() {
+fn recorded_rehearsal_replays_to_the_displayed_results() {
     rehearse(3.6, false);
 }
 
-/// Three minutes of motion.
+/// The vehicle moves for three minutes.
 #[test]
 #[ignore = "takes three minutes and more; .ci/run does it"]
 fn three_minute_rehearsal_gives_the_sections_of_the_scene_replay() {

@@ -1,7 +1,7 @@
 //! `headrace run` and `headrace check` with wrong, missing or silent ports.
 //!
-//! Each sensor's trouble is reported with the valid form, the dive goes on with the other sensors, and exit codes are
-//! right.
+//! Each faulty sensor is reported together with the valid form of its address. The dive goes on with the other
+//! sensors, and the exit codes are right.
 
 use headrace_tests::faulty::{End, Fault, Faulty, Healthy, Wire};
 use headrace_tests::pty::Terminal;
@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use crate::rehearsal::Running;
 
-/// Sensors with invalid lines, each in another way.
+/// Sensors with invalid lines. Each line has a different fault.
 const WRONG: [(&str, &str, &str); 7] = [
     ("no_colon", HEAD, "192.168.0.5"),
     ("no_port", HEAD, "tcp:192.168.0.5"),
@@ -45,7 +45,7 @@ fn report(folder: &Folder) -> Value {
     serde_json::from_slice(&folder.read("report.json")).unwrap()
 }
 
-/// Last status of each sensor, one line each.
+/// Last status of each sensor, one per line.
 fn statuses(report: &Value) -> String {
     let line = |source: &Value| {
         format!("{}: {}\n", source["id"].as_str().unwrap(), source["line"]["status"].as_str().unwrap())
@@ -57,7 +57,7 @@ const RUN: [&str; 7] = ["run", "vehicle.toml", "--no-record", "--report", "repor
 /// Arguments of a run without a time limit.
 const RUN_UNTIL: [&str; 2] = ["vehicle.toml", "--no-record"];
 
-/// Whether the first sensor has given readings and been reported as running.
+/// Whether the first sensor has given readings and was reported as running.
 fn first_runs(report: &Value) -> bool {
     let first = &report["sources"][0];
     let status = first["line"]["status"].as_str().unwrap_or_default();
@@ -91,7 +91,7 @@ fn wrong_or_missing_ports_are_reported_while_the_dive_goes_on() {
     let sensors: Vec<_> = [("head", HEAD, place.as_str())].into_iter().chain(WRONG).chain(ABSENT).collect();
     folder.write("vehicle.toml", vehicle(&sensors[..=WRONG.len()]));
     let (answer, wrong) = folder.dive_until(&RUN_UNTIL, first_runs);
-    // A head alone gives no position.
+    // A head alone can't give a position.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     let few: Vec<_> = sensors[..1].iter().chain(&ABSENT).copied().collect();
     folder.write("vehicle.toml", vehicle(&few));
@@ -119,7 +119,7 @@ fn wrong_or_missing_ports_are_reported_while_the_dive_goes_on() {
     address: closed: connect = "i2c:/dev/i2c-1:0x99": address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
     empty: closed: connect = "": it is empty; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     "#);
-    // A kernel without CAN gives another message.
+    // The message differs if the kernel has no CAN.
     let absent = statuses(&absent).replace(
         "this kernel has no CAN; sudo modprobe can-raw",
         "there is no such interface; plug the adapter in; ip link lists the interfaces",
@@ -144,7 +144,7 @@ fn dive_without_any_sensor_fails_with_each_reason() {
     }
 }
 
-/// Waits for the end of a dive with a blocked terminal: ten times as long as the program waits.
+/// Waits for the end of a dive with a blocked terminal. The limit is ten times the program's own wait.
 fn ends_and_reports(mut run: Running, folder: &Folder) {
     let code = (0..300).find_map(|_| {
         std::thread::sleep(Duration::from_millis(100));
@@ -188,7 +188,8 @@ fn blocked_pipe_at_any_byte_does_not_keep_a_dive_from_ending() {
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let whole = folder.headrace(&RUN).stdout.len();
     assert!((200..PIPE).contains(&whole), "{whole} bytes");
-    // The pipe is full from the start in the first case, and within the summary in the last.
+    // In the first case the pipe is full from the start. In the last case it becomes full in the middle of the
+    // summary.
     let lines = [0, whole - 150, whole - 100, whole - 50, whole - 10].map(|room| ("", room));
     let json = ["--json", "--json-lines"].map(|how| (how, 0));
     let runs = lines.into_iter().chain(json).map(|(how, room)| {
@@ -220,7 +221,7 @@ fn unavailable_required_sensor_ends_the_dive() {
     let mut said = refused("sonar", 2) + &refused("no_colon", 2) + &refused("all", 2);
     assert!(!folder.path("report.json").exists(), "no dive has begun");
     said += &refused("adapter", 1);
-    assert!(folder.path("report.json").exists(), "a dive that ends is reported");
+    assert!(folder.path("report.json").exists(), "a dive that ends must leave a report");
     insta::assert_snapshot!(said, @r#"
     headrace: --require sonar: no such sensor; expected all, or ids of no_colon, adapter, usb, counter, imu
     headrace: sensor "no_colon" is required: connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
@@ -229,7 +230,7 @@ fn unavailable_required_sensor_ends_the_dive() {
     "#);
 }
 
-/// Truncated reports, as of a counter by another maker.
+/// Reports that are too short, as from a counter by another maker.
 struct Short;
 
 impl Fault for Short {
@@ -267,7 +268,7 @@ fn live_log_has_sent_bytes_and_replays_to_the_same_digest() {
     let recorded = ["vehicle.toml", "--record", "dive.mcap", "--require", "all"];
     let (answer, live) = folder.dive_until(&recorded, first_runs);
     drop(devices);
-    // Without an inertial unit there is no position.
+    // A dive without an inertial unit has no position.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     let (code, replayed) = folder.replay("dive.mcap", &[]);
     assert_eq!((code, &replayed["digest"]), (Some(1), &live["digest"]));

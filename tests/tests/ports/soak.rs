@@ -1,4 +1,4 @@
-//! A long rehearsal whose devices freeze now and then: measures memory, files, threads, CPU time and drops.
+//! Measures memory, files, threads, CPU time and drops in a long rehearsal, in which devices freeze now and then.
 //!
 //! `HEADRACE_SOAK_MINUTES=60 cargo test -p headrace_tests --test ports soak -- --ignored --nocapture`
 
@@ -12,12 +12,12 @@ use super::rehearsal::{Running, headrace, interrupt, report, scene};
 
 /// Default length of a soak, minutes.
 const MINUTES: f64 = 10.0;
-/// Interval between two samples, and between two faults.
+/// Interval between two samples; faults have the same interval.
 const LOOK: Duration = Duration::from_secs(5);
 const LOOKS_A_FAULT: usize = 7;
 /// Duration of a freeze.
 const FREEZE: Duration = Duration::from_millis(1_500);
-/// Samples before files and threads count.
+/// Number of samples at the start that don't count for files and threads.
 const WARM_UP: usize = 12;
 
 /// Resources of a process.
@@ -38,13 +38,13 @@ fn look(pid: u32) -> Option<Look> {
     };
     let stat = std::fs::read_to_string(format!("{proc}/stat")).ok()?;
     let words: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    // User and system time are the 12th and 13th word after the name.
+    // User time and system time are the 12th and 13th word after the name.
     let cpu_ticks = words.get(11)?.parse::<f64>().ok()? + words.get(12)?.parse::<f64>().ok()?;
     let files = std::fs::read_dir(format!("{proc}/fd")).ok()?.count();
     Some(Look { resident_kib: field("VmRSS:")?, files, threads: field("Threads:")?, cpu_ticks })
 }
 
-/// Slope of a line fitted to equidistant values, per step.
+/// Slope of a line fitted to equally spaced values, per step.
 fn slope(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let (mean_at, mean) = ((count - 1.0) / 2.0, values.iter().sum::<f64>() / count);
@@ -104,10 +104,11 @@ fn soak_neither_leaks_nor_drops() {
     let resident: Vec<f64> = warm.iter().map(|look| look.resident_kib / 1024.0).collect();
     let tenths: Vec<String> =
         (0..=10).map(|tenth| format!("{:.1}", resident[tenth * (resident.len() - 1) / 10])).collect();
-    // Rings, lists and sections are allocated when the dive begins, but touched one after the other.
+    // Only the second half counts. Rings, lists and sections are allocated at the start of the dive, but their memory
+    // becomes resident only when it is first used.
     let later = &resident[resident.len() / 2..];
     let (first, last) = (warm[0], warm[warm.len() - 1]);
-    // Linux: 100 ticks a second.
+    // Linux counts CPU time in ticks of 10 ms.
     let core = (last.cpu_ticks - first.cpu_ticks) / 100.0 / ((warm.len() - 1) as f64 * LOOK.as_secs_f64());
     let dropped: u64 = report["sources"]
         .as_array()

@@ -1,6 +1,6 @@
-//! From device to readings without ports: splits and delays of a lossless stream don't change readings or times.
+//! From the device to readings without ports. Splits and delays of a lossless stream change no reading and no time.
 //!
-//! The time of each reading is that of the part with the first byte of its frame.
+//! The time of a reading is the time of the part that contains the first byte of its frame.
 
 use headrace::devices::KINDS;
 use headrace_config::Document;
@@ -17,7 +17,7 @@ use headrace_vehicle::VehicleConfig;
 const START: MonoNs = MonoNs(1_000_000_000);
 const FRAMES: usize = 60;
 
-/// Devices on byte streams.
+/// Devices with byte streams.
 const STREAMS: [&str; 7] = [
     "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\n",
     "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\nreturns = \"imx\"\n",
@@ -27,7 +27,7 @@ const STREAMS: [&str; 7] = [
     "plugin = \"a50\"\n",
     "plugin = \"mavlink\"\npart = \"imu\"\nsystem_id = 1\n",
 ];
-/// Devices whose carriers keep messages whole; these messages can only be late.
+/// Devices on carriers that keep messages whole. Their messages can only be late.
 const MESSAGES: [&str; 3] = [
     "plugin = \"imu_can\"\npreset = \"xsens_mti600\"\n",
     "plugin = \"bar100\"\n",
@@ -101,7 +101,7 @@ fn frames(device: &dyn Device, random: &mut Random) -> Vec<Vec<u8>> {
     }
 }
 
-/// Readings of these parts of a stream through driver and decoder, with the driver woken at its own deadlines.
+/// Readings from these parts of a stream through driver and decoder. The driver is woken at its deadlines.
 fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let mut driver = device.driver(&DriverSetup { begun: START, head: None });
     let mut wire = Delivered::default();
@@ -120,7 +120,7 @@ fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     readings
 }
 
-/// Readings of these parts through the decoder alone, as from a foreign log.
+/// Readings from these parts through the decoder alone, as in a foreign log.
 fn decoded(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let (mut decoder, mut readings) = (device.specification().decoder, Vec::new());
     for (received, bytes) in parts {
@@ -140,14 +140,14 @@ fn wake_until(driver: &mut dyn Driver, at: MonoNs, wire: &mut dyn Wire) {
     }
 }
 
-/// Delays of parts: mostly as on a good line, sometimes as on a bridge, a slow network, or one that fails for
-/// seconds.
+/// Delay of a part. It is usually that of a good line, but sometimes that of a bridge, a slow network, or a network
+/// that fails for seconds.
 fn delay(random: &mut Random) -> DurNs {
     let ms = [1, 1, 3, 20, 66, 66, 120, 250, 1500, 4000];
     DurNs::from_millis(ms[random.below(ms.len())])
 }
 
-/// Each frame whole, at the time of the part with its first byte.
+/// Each whole frame at the time of the part that contains its first byte.
 fn whole<'a>(frames: &'a [Vec<u8>], parts: &[(MonoNs, &[u8])]) -> Vec<(MonoNs, &'a [u8])> {
     let mut ends = Vec::new();
     for (at, part) in parts {
@@ -182,7 +182,7 @@ fn splits_and_delays_of_a_stream_do_not_change_readings_or_times() {
             let (mut parts, mut rest, mut at) = (Vec::new(), stream.as_slice(), START);
             while !rest.is_empty() {
                 let (now, later) = rest.split_at((1 + random.below(longest)).min(rest.len()));
-                // A long pause after every byte would take hours.
+                // Not every single byte is followed by a long pause, because that would take hours.
                 at = at
                     + if longest > 2 || random.one_in(50) {
                         delay(&mut random)

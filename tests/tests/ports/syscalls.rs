@@ -17,7 +17,7 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n";
 const PACKETS: usize = 40_000;
 
-/// Runs traced work between two calls that nothing else makes.
+/// Runs traced work between two system calls that mark its start and end. Nothing else makes these calls.
 fn marked<T>(work: impl FnOnce() -> T) -> T {
     std::hint::black_box(getppid());
     let done = work();
@@ -39,7 +39,8 @@ fn calls(trace: &str) -> (Vec<&str>, usize) {
             within = None;
             parts += 1;
         } else if within == Some(thread)
-            // Skips signals, and ends of interrupted calls, including the mark's own.
+            // Lines with signals don't count, nor do the ends of interrupted calls. One of these may belong to a
+            // mark.
             && !call.starts_with("---")
             && !call.starts_with("<... ")
         {
@@ -61,19 +62,19 @@ fn armed_tick_makes_no_system_call() {
         skipped("strace isn't there, or may not trace");
         return;
     }
-    let ticks = ["--exact", "syscalls::ticks_to_be_traced", "--ignored", "--test-threads=1"];
+    let ticks = ["--exact", "syscalls::ticks_for_the_system_call_trace", "--ignored", "--test-threads=1"];
     let output = traced(&std::env::current_exe().unwrap(), &ticks).unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
     let trace = std::fs::read_to_string(&trace).unwrap();
     let (calls, ticks) = calls(&trace);
-    // The single call is deliberate, to test that calls are seen.
+    // The traced work makes this call on purpose, to prove that the trace shows calls.
     assert!(calls.len() == 1 && calls[0].starts_with("getuid("), "in {ticks} ticks: {calls:#?}");
     assert!(ticks > 1000, "{ticks} ticks");
 }
 
 #[test]
 #[ignore = "armed_tick_makes_no_system_call runs it"]
-fn ticks_to_be_traced() {
+fn ticks_for_the_system_call_trace() {
     let scene = scenes::scene(SCENE);
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

@@ -1,5 +1,5 @@
-//! Device bytes with changes, losses and insertions: readings are finite and don't depend on splits, and counts add
-//! up.
+//! Device bytes with changes, losses and insertions. All readings are finite and don't depend on splits, and the
+//! counts add up.
 
 use headrace::devices::KINDS;
 use headrace_config::Document;
@@ -12,7 +12,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::{Case, few, many};
 
-/// A vehicle, and the bytes of each of its sensors in a short dive.
+/// A vehicle, and the bytes that each of its sensors sends in a short dive.
 struct Lines {
     vehicle: VehicleConfig,
     messages: Vec<Vec<Vec<u8>>>,
@@ -35,7 +35,7 @@ fn lines() -> [Lines; 2] {
     })
 }
 
-/// One time for all parts, so that readings don't depend on how the bytes arrive.
+/// All parts have the same time, so that readings can't depend on the times at which bytes arrive.
 const AT: MonoNs = MonoNs(1_000_000_000);
 
 fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {
@@ -96,7 +96,7 @@ fn byte_splits_do_not_change_finite_readings() {
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn codecs_hold_for_many_cases() {
+fn byte_splits_do_not_change_finite_readings_in_a_long_run() {
     let lines = lines();
     many("codecs", &|case| decoding(case, &lines));
 }

@@ -1,4 +1,4 @@
-//! A factored covariance through random steps: it stays a covariance, and each measurement follows the scalar
+//! A factored covariance after random steps. It stays a valid covariance, and each measurement follows the scalar
 //! formula.
 
 use headrace_fusion::filter::factors::Factors;
@@ -7,8 +7,8 @@ use headrace_geometry::math;
 use crate::{Case, few, many};
 
 const N: usize = 6;
-/// Tolerance as a share. Dependent variances of 1e-10 and 1e+10 have factors of 1e10. In two million cases four were
-/// over 1e-9, the worst 3e-8.
+/// Relative tolerance. Dependent variances of 1e-10 and 1e+10 have factors with a ratio of 1e10. In two million
+/// cases, four errors were over 1e-9, and the largest was 3e-8.
 const SHARE: f64 = 1e-6;
 
 fn row(case: &mut Case) -> [f64; N] {
@@ -45,14 +45,15 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 let (h, noise) = (row(case), case.of_any_size(-10, 10).abs());
                 let before = p.variance_along(&h);
                 let gain = p.measure(&h, noise);
-                // The sum of both, and the remaining variance: v noise / (v + noise).
+                // The innovation variance is the sum of both variances. The remaining variance is v noise / (v +
+                // noise).
                 let (sum, left) = (before + noise, before / (1.0 + before / noise));
                 let after = p.variance_along(&h);
                 let size: f64 = (0..N).map(|i| h[i] * h[i] * p.variance(i)).sum();
                 if (gain.variance / sum - 1.0).abs() > SHARE {
                     return Err(format!("innovation {} is not {sum}", gain.variance));
                 }
-                // Terms that cancel in h P h^T are as large as its parts.
+                // The tolerance depends on the terms of h P h^T, because these can be large and cancel.
                 if (after - left).abs() > SHARE * left + SHARE * size {
                     return Err(format!(
                         "{after:e} is left, not {left:e}; before {before:e}, noise {noise:e}"
@@ -71,7 +72,7 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 }
             }
             3 => {
-                // Each error drives the ones before it, as velocity drives position.
+                // Each error drives the error before it, as velocity drives position.
                 let dt = case.of_any_size(-9, 2).abs();
                 p.shear(|column, len| {
                     for i in 0..len.saturating_sub(1) {
@@ -93,6 +94,6 @@ fn covariance_stays_valid_and_measurements_follow_the_scalar_formula() {
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn filter_holds_for_many_cases() {
+fn covariance_stays_valid_in_a_long_run() {
     many("filter", &steps);
 }

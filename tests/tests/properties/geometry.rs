@@ -1,12 +1,12 @@
-//! Rays in random cross-sections, compared with the plain formula on each edge.
+//! Rays in random cross-sections, compared with the plain formula for each edge.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use crate::{Case, few, many, within};
 
-/// Tolerance, m. Hits on edges of a micrometre are exact to some nanometres: the test on which side of a ray their
-/// ends lie cancels digits down to their length.
+/// Tolerance, m. On edges of a micrometre, hits are exact to some nanometres. The test for the side of a ray on which
+/// an edge's end lies loses digits, and the error is then comparable with the edge's length.
 const OFF_M: f64 = 1e-8;
 
 /// Corners of a polygon that is star-shaped about (0, 3), with repeated points, slivers, corners and straight runs.
@@ -32,7 +32,8 @@ fn points(case: &mut Case) -> Vec<Yz> {
         .collect()
 }
 
-/// First edge that a ray meets: distance in ray lengths, and sine between ray and edge. Edges are extended slightly.
+/// First edge that a ray meets, extended slightly. Returns the distance in ray lengths, and the sine between ray and
+/// edge.
 fn meets(points: &[Yz], origin: Yz, ray: Yz) -> Option<(f64, f64)> {
     let cross = |a: Yz, b: Yz| a[0] * b[1] - a[1] * b[0];
     let edges = points.iter().zip(points.iter().cycle().skip(1));
@@ -50,7 +51,7 @@ fn rays(case: &mut Case) -> Result<(), String> {
     let given = points(case);
     let profile = match Profile::polygon(&given, Some([0.0, 3.0])) {
         Ok(profile) => profile,
-        // Too few distinct points, or a gap of half a turn: refused with a reason.
+        // A polygon with too few distinct points or with a gap of half a turn is refused, and needs a reason.
         Err(why) => return if why.to_string().is_empty() { Err("no reason".to_owned()) } else { Ok(()) },
     };
     for _ in 0..8 {
@@ -90,7 +91,7 @@ fn rays(case: &mut Case) -> Result<(), String> {
                 nearest.distance_m
             ));
         }
-        // Through a corner or along an edge, rounding decides which of two walls is hit.
+        // If a ray goes through a corner or along an edge, rounding decides which of two walls it hits.
         if let Some((t, sine)) = meets(&given, origin, ray)
             && sine > 1e-3 * math::hypot(ray[0], ray[1])
         {
@@ -109,7 +110,7 @@ fn rays(case: &mut Case) -> Result<(), String> {
     inverses(case, &profile)
 }
 
-/// Converts arc length to a place and back, in a polygon and in a shape of arcs.
+/// Converts an arc length to a place and back, both in a polygon and in a shape of arcs.
 fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
     let width_m = case.between(0.5, 12.0);
     let shape = match case.below(3) {
@@ -121,7 +122,8 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
         let arc_m = case.unit() * profile.perimeter_m();
         let place = profile.point_at(arc_m);
         let back = profile.point_at(profile.arc_of(place));
-        // Directions are compared, because an edge that points at the reference point has a single direction.
+        // Directions are compared instead of arc lengths: all points of an edge that points at the reference point
+        // share one direction.
         let [to, from] =
             [place, back].map(|at| [at[0] - profile.reference()[0], at[1] - profile.reference()[1]]);
         let turned_rad = math::atan2(to[0] * from[1] - to[1] * from[0], to[0] * from[0] + to[1] * from[1]);
@@ -139,6 +141,6 @@ fn rays_match_the_plain_formula() {
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn geometry_holds_for_many_cases() {
+fn rays_match_the_plain_formula_in_a_long_run() {
     many("geometry", &rays);
 }

@@ -1,11 +1,11 @@
-//! The largest hole of random sample arrangements, compared with Voronoi vertices of all samples.
+//! The largest hole of random arrangements of samples, compared with the Voronoi vertices of all samples.
 
 use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
 use headrace_oracle::wall::Wall;
 
 use crate::{Case, few, many};
 
-/// Samples that are random, on a lattice, on a line, in one place, coincident, or denser than any vehicle's.
+/// Samples that are random, on a lattice, on a line, at one place, coincident, or denser than those of any vehicle.
 fn samples(case: &mut Case, perimeter_m: f64) -> Vec<[f64; 2]> {
     let count = 1 + case.below(24);
     let kind = case.below(7);
@@ -58,7 +58,7 @@ fn hole(case: &mut Case) -> Result<(), String> {
     if !numbers.iter().all(|number| number.is_finite()) {
         return Err(format!("{hole:?}"));
     }
-    // A far chainage rounds positions, so the oracle gets the same rounded samples.
+    // Far chainages round the positions of samples, so the oracle gets the rounded samples.
     let wall = Wall::new(samples.iter().map(|[x_m, arc_m]| [(x_m + along_m) - along_m, *arc_m]), perimeter_m)
         .map_err(|why| why.to_string())?;
     let ends = [(from_m + along_m) - along_m, (to_m + along_m) - along_m];
@@ -87,6 +87,6 @@ fn holes_match_the_voronoi_diagram() {
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn holes_hold_for_many_cases() {
+fn holes_match_the_voronoi_diagram_in_a_long_run() {
     many("holes", &hole);
 }

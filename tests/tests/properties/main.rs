@@ -3,8 +3,9 @@
 //!     HEADRACE_PROPERTY_CASES=10000000 cargo test -p headrace_tests --test properties -- --ignored --nocapture
 //!     HEADRACE_PROPERTY_SEED=42 HEADRACE_PROPERTY_CASES=1000000 cargo test -p headrace_tests --test properties holes -- --ignored --nocapture
 //!
-//! The five subjects share the cases; the seed is printed with the count. Case n of a seed is case 0 of seed + n.
-//! Ordinary tests run a few thousand fixed cases of each subject.
+//! The cases are divided among the five subjects, and the seed is printed with the number of cases. Case n of a seed
+//! equals case 0 of seed + n. Ordinary tests run a few thousand cases of each subject, which are the same in every
+//! run.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -19,10 +20,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use headrace_geometry::math;
 use headrace_tests::random::Random;
 
-/// Number of cases of a subject in ordinary tests, and the seed of the first.
+/// Number of cases of a subject in ordinary tests, and seed of the first case.
 const FEW: u64 = 3000;
 const SEED_OF_FEW: u64 = 20_260_901;
-/// Default number of cases of all subjects in a long run.
+/// Default number of cases in a long run, for all subjects together.
 const MANY: u64 = 10_000_000;
 const SUBJECTS: u64 = 5;
 
@@ -30,33 +31,33 @@ const SUBJECTS: u64 = 5;
 pub(crate) struct Case(Random);
 
 impl Case {
-    /// From 0 to below 1.
+    /// A random number from 0 to below 1.
     pub(crate) fn unit(&mut self) -> f64 {
         (self.0.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// From `from` to below `to`.
+    /// A random number from `from` to below `to`.
     pub(crate) fn between(&mut self, from: f64, to: f64) -> f64 {
         from + (to - from) * self.unit()
     }
 
-    /// A power of ten whose exponent is between these.
+    /// A random power of ten with an exponent between `from` and `to`.
     pub(crate) fn power_of_ten(&mut self, from: f64, to: f64) -> f64 {
         math::exp(self.between(from, to) * core::f64::consts::LN_10)
     }
 
-    /// Magnitude between two powers of ten, with either sign.
+    /// A random number of either sign with a magnitude between two powers of ten.
     pub(crate) fn of_any_size(&mut self, from: i32, to: i32) -> f64 {
         let size = self.power_of_ten(f64::from(from), f64::from(to));
         if self.below(2) == 0 { size } else { -size }
     }
 
-    /// Below `limit`.
+    /// A random integer below `limit`.
     pub(crate) fn below(&mut self, limit: usize) -> usize {
         self.0.below(limit)
     }
 
-    /// Below `limit`.
+    /// A random integer below `limit`.
     pub(crate) fn count_below(&mut self, limit: u32) -> u32 {
         u32::try_from(self.0.bits() % u64::from(limit)).unwrap()
     }
@@ -73,7 +74,7 @@ pub(crate) fn within(error: f64, bound: f64) -> bool {
 
 type Property<'a> = &'a dyn Fn(&mut Case) -> Result<(), String>;
 
-/// Runs `count` cases; returns those that fail or panic, ten at most.
+/// Runs `count` cases. Returns the cases that fail or panic, up to ten.
 fn failing(subject: &str, seed: u64, count: u64, property: Property<'_>) -> Vec<String> {
     let mut found = Vec::new();
     for number in 0..count {
@@ -101,7 +102,7 @@ pub(crate) fn few(subject: &str, property: Property<'_>) {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Checks a property with its subject's share of many cases.
+/// Checks a property with the subject's share of the cases in a long run.
 #[track_caller]
 pub(crate) fn many(subject: &str, property: Property<'_>) {
     let number = |name: &str| {
@@ -117,7 +118,7 @@ pub(crate) fn many(subject: &str, property: Property<'_>) {
     println!("{subject}: {count} cases hold");
 }
 
-/// A planted fault is found and reported with its seed.
+/// The property contains a planted fault, which must be found and reported with its seed.
 #[test]
 fn failing_case_is_reported_and_repeatable() {
     let rare = |case: &mut Case| if case.below(500) == 7 { Err("seven".to_owned()) } else { Ok(()) };

@@ -1,4 +1,5 @@
-//! The paper's equations for random arguments: a finite number that its inverse confirms, or a named error.
+//! The paper's equations for random arguments. The result is a finite number that the inverse equation confirms, or a
+//! named error.
 
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
 use headrace_sampling::head::Turn;
@@ -8,7 +9,7 @@ use headrace_sampling::spacing::{self, Spiral};
 
 use crate::{Case, few, many, within};
 
-/// A random number, rarely a sensible one.
+/// A random number. It is rarely a sensible argument.
 fn any(case: &mut Case) -> f64 {
     match case.below(12) {
         0 => 0.0,
@@ -41,7 +42,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
     ];
     for (number, told) in told.into_iter().enumerate() {
         match told {
-            // Results beyond the largest double are infinite. Only arguments of that size may give them.
+            // Infinite results are allowed only if an argument is extremely large or small.
             Ok(value)
                 if value.is_finite() || [a, b, c].iter().any(|x| x.abs() > 1e100 || x.abs() < 1e-100) => {}
             Ok(value) => return Err(format!("equation {number} of {a:e} {b:e} {c:e} {m}: {value}")),
@@ -53,7 +54,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("a turn of {a:e} {b:e}"));
     }
 
-    // Steps add up to the distance along the wall, however near to 90 degrees the last one ends.
+    // The steps add up to the distance along the wall, even if the last step ends near 90 degrees.
     let last = 1 + case.count_below(400);
     let end_rad = FRAC_PI_2 * (1.0 - case.power_of_ten(-9.0, -0.1));
     let theta = end_rad / f64::from(last);
@@ -70,7 +71,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("step {last} of {theta:e} at {h}: {tangent} is not the footprint {footprint}"));
     }
 
-    // The speed for a target gives the target back, also as T_y approaches it.
+    // At the speed for a target, the spacing equals the target, even if T_y is close to the target.
     let target = case.between(0.1, 3.0);
     let t_y = target * (1.0 - case.power_of_ten(-15.0, 0.0));
     let (gap_s, ping_s) = (case.between(0.1, 30.0), case.between(0.001, 0.1));
@@ -88,7 +89,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err("a speed where there is none".to_owned());
     }
 
-    // One step a turn or thousands: the advance of a turn is the sum of its pings.
+    // The advance of a turn is the sum of the advances of its pings, with one step per turn or with thousands.
     let steps = 1 + case.count_below(3000);
     let turn = Turn::new(TAU / f64::from(steps), ping_s).map_err(|why| why.to_string())?;
     let spiral = Spiral::new(speed, turn, 1.0).map_err(|why| why.to_string())?;
@@ -96,7 +97,8 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("{steps} steps: {} and {}", spiral.pitch_m(), spiral.advance_m()));
     }
 
-    // A start angle lies within the turn, and the phase is restored at the other end of the hull.
+    // A start angle lies within the turn. The inverse computation, for the other end of the hull, gives the phase
+    // again.
     let (phase, rate) = (case.between(0.0, TAU), case.between(0.1, 3.0));
     let (x, v) = (case.between(-2.0, 2.0), case.power_of_ten(-9.0, 1.0));
     if let Ok(start) = start_rad(phase, rate, x, v) {
@@ -117,6 +119,6 @@ fn equations_give_an_invertible_number_or_an_error() {
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn sampling_holds_for_many_cases() {
+fn equations_give_an_invertible_number_or_an_error_in_a_long_run() {
     many("sampling", &equations);
 }

@@ -1,7 +1,7 @@
-//! The advice is right: simulated vehicles that follow it meet the target, and a tenth faster they miss it.
+//! The advice is right: simulated vehicles that follow it meet the target, and those that are a tenth faster miss it.
 //!
-//! Heads apart along the hull start in phase for the speed that the advice gives for their mode. They keep turning
-//! unchanged when the pilot drives at another speed.
+//! Heads that are apart along the hull start in phase for the speed that the advice gives for their mode. They keep
+//! turning in the same way when the pilot drives at another speed.
 
 use std::fmt::Write as _;
 
@@ -13,14 +13,14 @@ use headrace_tests::advised::{Advised, dive};
 use headrace_tests::scenes;
 
 const TICK: DurNs = DurNs(20_000_000);
-/// Chainage at which dives begin, and the length of tunnel that is judged, m.
+/// Chainage at which dives begin, and length of the judged part, m.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
-/// If the holes of half of the sections reach this share of the predicted T, a tenth more speed must show in them.
+/// If the median hole exceeds this fraction of the predicted T, a speed increase by a tenth must make sections fail.
 const NEAR: f64 = 0.95;
 /// Number of updates in which a vehicle comes to a stop.
 const BRAKING: usize = 15;
-/// Oscillation of the vehicle under a pilot.
+/// Oscillation of a vehicle that a pilot steers.
 const SWING: &str = "pilot_drift = { yaw_deg = 10, period_s = 20 }\n";
 
 /// A vehicle on its way along the tunnel.
@@ -33,7 +33,7 @@ struct Case {
     target_m: f64,
     aside_m: f64,
     yaw_deg: f64,
-    /// A source that sends nothing.
+    /// Source that sends nothing.
     dumb: Option<&'static str>,
     effects: &'static str,
     filter: bool,
@@ -84,12 +84,12 @@ const SWINGING: [Case; 6] = [
 ];
 
 impl Case {
-    /// Distance from the ends of the dive in which sections aren't judged, m: not all heads have passed there.
+    /// Length at either end of the dive in which sections aren't judged, m, because not all heads have passed there.
     fn ends_m(&self) -> f64 {
         1.2 * self.target_m + 1.0 + 8.0 * self.yaw_deg.to_radians()
     }
 
-    /// A scene of `length_m` at `speed_mps`, with heads in phase for `planned_mps`.
+    /// A scene of `length_m` at `speed_mps`, with heads that are in phase for `planned_mps`.
     fn scene(&self, planned_mps: f64, speed_mps: f64, length_m: f64) -> Scene {
         let Self { vehicle, layout, mode, target_m, aside_m, yaw_deg, effects, .. } = self;
         let way = if self.filter { "filter" } else { "direct" };
@@ -124,14 +124,14 @@ impl Case {
         dive(&self.scene(planned_mps, speed_mps, length_m), self.dumb, TICK)
     }
 
-    /// Speed for which heads are put in phase: the advice for their mode at that speed.
+    /// Speed for which the heads are in phase. It is the advice for their mode with heads in phase for that advice.
     fn planned_mps(&self) -> f64 {
         let first = dive(&self.scene(0.1, 0.1, 3.0), self.dumb, TICK);
         let alternatives = first.beats.last().unwrap().advice.alternatives;
         alternatives.iter().flatten().find(|other| other.mode.as_str() == self.mode).unwrap().v_max_mps
     }
 
-    /// The advice during a dive, and the dives at it and at a tenth more.
+    /// Advised speed during a dive, and results of dives at this speed and at a tenth more.
     fn followed(&self) -> Followed {
         let planned_mps = self.planned_mps();
         let v_max_mps = self.dive(planned_mps, planned_mps).median(v_max_mps);
@@ -148,13 +148,13 @@ struct Followed {
     dives: [Advised; 2],
 }
 
-/// Results of the length between the ends.
+/// Results of the part between the ends.
 struct Judged {
     failing: f64,
     passing: f64,
-    /// Predicted T at that speed, m, as the median of the updates.
+    /// Predicted T at the driven speed, m; median of all updates.
     predicted_t_m: f64,
-    /// Holes of sections as shares of that T: median and largest.
+    /// Ratio of holes to the predicted T: median and largest over the sections.
     holes: [f64; 2],
 }
 
@@ -210,25 +210,28 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
         if at.failing > 0.02 || at.passing < 0.98 {
             broken.push(format!("{}: {:.3} fail when it is followed", case.what, at.failing));
         }
-        // The forecast agrees with the advice until the vehicle slows down at the end.
+        // Advice and forecast agree until the vehicle slows down at the end.
         let forecast = |dive: &Advised| {
             let settled = &dive.settled()[..dive.settled().len() - BRAKING];
             settled.iter().filter(|beat| beat.advice.will_exceed).count() as f64 / settled.len() as f64
         };
-        // With heads apart along the hull, T is least at one speed. Rounding of counter and angles keeps it above
-        // that.
+        // If heads are apart along the hull, T has its minimum at one speed. Rounding of counter and angles can keep
+        // T above the target there.
         let met = at.predicted_t_m <= case.target_m;
         within += usize::from(met);
         if met && forecast(&dives[0]) > 0.0 || forecast(&dives[1]) < 1.0 {
-            broken.push(format!("{}: the forecast says otherwise", case.what));
+            broken.push(format!("{}: the forecast contradicts the advice", case.what));
         }
         if at.holes[0] >= NEAR {
             near += 1;
             if above.failing < 0.5 {
-                broken.push(format!("{}: {:.3} fail a tenth faster", case.what, above.failing));
+                broken.push(format!(
+                    "{}: only {:.3} of the sections fail at a tenth more speed",
+                    case.what, above.failing
+                ));
             }
         }
-        // If fewer sections fail, the reason is that their holes stay below the prediction, and nowhere above it.
+        // If fewer sections fail, their holes are smaller than predicted. No hole may be larger than predicted.
         if at.holes[1].max(above.holes[1]) > 1.0 {
             broken.push(format!("{}: holes of {:?} and {:?} of T", case.what, at.holes, above.holes));
         }
@@ -238,9 +241,10 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
-/// Sections missed at a third above the advice get a repeat speed near that advice. Both numbers are on one screen.
+/// Sections are missed at a speed a third above the advice. The speed for repeating them must be near the advice,
+/// because both numbers are on one screen.
 #[test]
-fn way_home_and_advice_give_similar_speeds() {
+fn repeat_speed_of_a_missed_section_is_near_the_advice() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
     let coarse = Case { mode: "faster", ..FOUR };
     for case in [VITA1, FOUR, sectors(TWO, 0.9), sectors(FOUR, 0.5), sectors(FOUR, 0.7), sectors(coarse, 0.5)]
@@ -260,7 +264,7 @@ fn way_home_and_advice_give_similar_speeds() {
 }
 
 #[test]
-fn advice_for_a_swinging_vehicle_is_lower_and_holds() {
+fn advice_for_a_swinging_vehicle_is_lower_and_meets_the_target() {
     let mut broken = Vec::new();
     for case in &SWINGING {
         let followed = case.followed();
@@ -268,7 +272,7 @@ fn advice_for_a_swinging_vehicle_is_lower_and_holds() {
         let steady_mps = Case { effects: "", ..*case }.planned_mps();
         println!("{:20} {steady_mps:.4} m/s without the swing", "");
         if followed.v_max_mps > 0.99 * steady_mps {
-            broken.push(format!("{}: {:.4} m/s, swinging or not", case.what, followed.v_max_mps));
+            broken.push(format!("{}: {:.4} m/s with and without swinging", case.what, followed.v_max_mps));
         }
         if followed.at.failing > 0.02 {
             broken.push(format!("{}: {:.3} fail when it is followed", case.what, followed.at.failing));
@@ -290,14 +294,15 @@ const LOSSY: [Case; 4] = [
     },
 ];
 
-/// While returns are lost, 95 of 100 sections pass at the advised speed. At the speed advised without losses they
-/// don't.
+/// While returns are lost, 95 of 100 sections pass at the advised speed, and fewer pass at the speed advised without
+/// losses.
 #[test]
 fn advice_compensates_lost_returns() {
     let mut broken = Vec::new();
     for case in &LOSSY {
         let sound_mps = Case { effects: "", ..*case }.planned_mps();
-        // Losses are known some turns after they began. At low speed, the vehicle hasn't moved far by then.
+        // The loop knows the losses only some turns after they began. The vehicle is slow, so that it hasn't moved
+        // far by then.
         let v_max_mps = case.dive(sound_mps, 0.5 * sound_mps).median(v_max_mps);
         let dives = [v_max_mps, sound_mps].map(|speed_mps| case.dive(sound_mps, speed_mps));
         let [at, as_before] = [0, 1].map(|k| Judged::of(case, &dives[k]));
@@ -309,25 +314,34 @@ fn advice_compensates_lost_returns() {
             100.0 * as_before.passing
         );
         if at.passing < 0.95 {
-            broken.push(format!("{}: {:.3} pass when it is followed", case.what, at.passing));
+            broken.push(format!(
+                "{}: only {:.3} of the sections pass if the advice is followed",
+                case.what, at.passing
+            ));
         }
         if as_before.passing > 0.9 {
-            broken.push(format!("{}: {:.3} pass at the speed without losses", case.what, as_before.passing));
+            broken.push(format!(
+                "{}: {:.3} of the sections pass at the speed without losses",
+                case.what, as_before.passing
+            ));
         }
-        // The repeat speed and the present limit are on one screen.
+        // The speed for repeating sections must be near the present limit, because both are on one screen.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
-            broken.push(format!("{}: again at {again:.4} m/s, where {v_max_mps:.4} is advised", case.what));
+            broken.push(format!(
+                "{}: the repeat speed is {again:.4} m/s, but {v_max_mps:.4} is advised",
+                case.what
+            ));
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
-    // A few single losses have little effect.
+    // Single lost returns have little effect.
     let few = Case { effects: "missing_returns = { share = 0.05 }\n", ..VITA1 };
     let [sound_mps, mps] = [VITA1, few].map(|case| case.dive(0.1, 0.1).median(v_max_mps));
     assert!((0.85..0.99).contains(&(mps / sound_mps)), "{mps} of {sound_mps}");
 }
 
 #[test]
-fn advice_says_so_if_slower_does_not_help() {
+fn advice_states_that_a_lower_speed_does_not_help() {
     let coarse = Case { mode: "fastest", target_m: 0.3, ..VITA1 };
     for speed_mps in [0.1, 0.03] {
         let dive = coarse.dive(speed_mps, speed_mps);
@@ -337,11 +351,11 @@ fn advice_says_so_if_slower_does_not_help() {
         assert!(matches!(dive.settled()[0].advice.remedy, Some(Remedy::Mode(_))));
         assert!(Judged::of(&coarse, &dive).failing > 0.98, "{speed_mps} m/s");
     }
-    // In the alternative mode the target is met.
+    // The target is met in the alternative mode.
     let Some(Remedy::Mode(mode)) = coarse.dive(0.1, 0.1).settled()[0].advice.remedy else { panic!() };
     let finer = Case { mode: mode.as_str().to_owned().leak(), ..coarse };
     assert!(finer.followed().at.failing <= 0.02, "{mode:?}");
-    // Nothing covers the sector of a silent head.
+    // No other head covers the sector of a silent head.
     let unseen = Case { layout: "sector_offset", dumb: Some("sonar_1"), ..TWO }.dive(0.1, 0.1);
     let last = unseen.settled()[0].advice;
     assert_eq!((last.reason, last.v_max_mps), (Reason::AngularStep, 0.0));
@@ -355,12 +369,13 @@ fn filter_uncertainty_lowers_the_advice_by_its_margin_only() {
         let filtered = Case { filter: true, ..case }.dive(0.15, 0.15);
         let off = filtered.median(v_max_mps) / direct_mps - 1.0;
         println!("{}: {direct_mps:.4} m/s, {:+.2} % with the filter", case.what, 100.0 * off);
-        // Two standard deviations of the distance between passes, a few centimetres.
+        // The margin is two standard deviations of the distance between passes, a few centimetres.
         assert!((-0.08..-0.01).contains(&off), "{}: {off}", case.what);
     }
 }
 
-/// Changes per minute of a displayed value, counted between updates for which `changed` returns true.
+/// Number of changes of a displayed value per minute. A change is a pair of consecutive updates for which `changed`
+/// returns true.
 fn a_minute(beats: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry) -> bool) -> f64 {
     let changes = beats.windows(2).filter(|pair| changed(&pair[0], &pair[1])).count();
     changes as f64 * 300.0 / beats.len() as f64
@@ -369,7 +384,7 @@ fn a_minute(beats: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry) 
 #[test]
 fn advice_in_the_field_changes_slowly_enough_to_read() {
     let text = include_str!("../../../deploy/scenes/vita1-field.toml").replace("../vehicles/", "");
-    // At a speed that meets the target half of the time.
+    // At this speed the target is met half of the time.
     let shorter = text.replace("distance_m = 130\nspeed_mps = 0.16", "distance_m = 50\nspeed_mps = 0.197");
     assert_ne!(text, shorter);
     let scene = scenes::scene(&shorter);
@@ -388,13 +403,13 @@ fn advice_in_the_field_changes_slowly_enough_to_read() {
     );
     assert!(jumps <= 1.0 && reasons <= 0.2, "{jumps} and {reasons}");
     assert!(crossings > 10.0 && forecasts < 0.5 * crossings, "{forecasts} of {crossings}");
-    // A forecast that is withdrawn has been displayed for a second at least.
+    // A forecast is displayed for at least a second before it is withdrawn.
     let mut since = None;
     for (k, beat) in beats.iter().enumerate() {
         match (beat.advice.will_exceed, since) {
             (true, None) => since = Some(k),
             (false, Some(begun)) => {
-                assert!(k - begun >= 6, "from beat {begun} to {k}");
+                assert!(k - begun >= 6, "from update {begun} to {k}");
                 since = None;
             }
             _ => {}

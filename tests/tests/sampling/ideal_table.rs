@@ -1,9 +1,9 @@
 //! The table of ideal scenes, from scene to bytes to log to report.
 //!
-//! It covers SLOW to FASTEST with 1, 2 and 4 heads in phase shift, together at the circle's centre of the `ceran`
-//! profile, at 0.197 m/s. The mean distance between passes must be v T / s within 0.5 %. The largest hole over nine
-//! metres must be within 0.1 % of the table, whose values come from an independent computation of Delaunay
-//! circumcircles.
+//! It covers the modes SLOW to FASTEST with 1, 2 and 4 phase-shifted heads at 0.197 m/s. All heads are at the centre
+//! of the circle in the `ceran` profile. The mean distance between passes must be v T / s within 0.5 %. The largest
+//! hole over nine metres must be within 0.1 % of the value in the table, which was computed independently from
+//! Delaunay circumcircles.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,7 +1,7 @@
-//! Interleaving of several heads by the paper's §5, tested by stepping heads ping by ping along a straight tunnel.
+//! Interleaving of several heads by the paper's §5. The tests step the heads ping by ping along a straight tunnel.
 //!
-//! The tests collect the chainages at which each head looks at an angle. Only positions are simulated, from each
-//! head's program; no layout formula is used to test another.
+//! They collect the chainages at which each head looks at an angle. The positions come from each head's program
+//! alone, so no layout formula is tested with another one.
 
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::math::{PI, TAU, floor_to_i64};
@@ -15,17 +15,18 @@ use headrace_sampling::layout::{
 use headrace_sampling::schedule::Schedule;
 use proptest::{prelude::*, test_runner::RngSeed};
 
-/// Angles closer than this count as equal, radians: far above rounding, far below a step.
+/// Angles that differ by less than this count as equal, radians. The value is far above rounding errors and far below
+/// a step.
 const SAME_RAD: f64 = 1e-9;
 const SAME_M: f64 = 1e-7;
 /// Number of pings in a turn, divisible by 2 to 6 sectors.
 const STEPS: u32 = 120;
-/// Facings: all forward, alternating, one forward before the others aft, and all aft.
+/// Directions of the heads: all forward, alternating, the first forward and all others aft, and all aft.
 const FACINGS: [fn(usize) -> bool; 4] = [|_| false, |k| k % 2 == 1, |k| k > 0, |_| true];
 
 const SPEEDS_MPS: [f64; 3] = [0.1, 0.197, 0.8];
 
-/// Heads along a hull, all on the axis and turning in the same direction.
+/// Heads along a hull. All of them are on the axis and turn in the same direction.
 #[derive(Debug, Clone)]
 struct Rig {
     hull_m: Vec<f64>,
@@ -63,7 +64,7 @@ impl Rig {
         self.hull_m.iter().zip(&self.aft).map(spec).collect()
     }
 
-    /// A dive at `speed_mps` of heads laid out for `planned_mps`, some turns longer than the hull.
+    /// A dive at `speed_mps` with heads laid out for `planned_mps`. It is some turns longer than the hull.
     fn dive(&self, layout: HeadLayout, planned_mps: f64, speed_mps: f64) -> Dive {
         let [back_m, front_m] = ends(&self.hull_m);
         let ping_m = speed_mps * self.ping_s();
@@ -75,7 +76,7 @@ impl Rig {
             let off = wrapped(body[0] - TAU * k as f64 / self.hull_m.len() as f64);
             assert!(
                 self.hull_m[k] < front_m || off.abs() < SAME_RAD,
-                "the foremost, {k}, starts at {}",
+                "the foremost head {k} starts at {}",
                 body[0]
             );
             Track { x_m: self.hull_m[k], ping_m, body }
@@ -91,12 +92,12 @@ fn ends(of: &[f64]) -> [f64; 2] {
     [of.iter().copied().fold(f64::MAX, f64::min), of.iter().copied().fold(f64::MIN, f64::max)]
 }
 
-/// Angle wrapped to half a turn either way.
+/// Angle wrapped to between minus and plus half a turn.
 fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// A head's own angles at the pings, not reduced to a turn.
+/// Angles of a head at its pings. They are not reduced to one turn.
 fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     let mut step_rad = if program.growing { step_rad } else { -step_rad };
     let Some((least, size)) = program.sector else {
@@ -115,7 +116,7 @@ fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     angles
 }
 
-/// A head's trajectory: its start, and its angle in the body's frame at each ping.
+/// Motion of a head: its start, and its angle in the body frame at each ping.
 struct Track {
     x_m: f64,
     ping_m: f64,
@@ -123,7 +124,7 @@ struct Track {
 }
 
 impl Track {
-    /// Chainages at which it looks at a body angle; a turning point at that angle counts once.
+    /// Chainages at which the head looks at a body angle. A turning point at this angle counts once.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let off: Vec<f64> = self.body.iter().map(|body| wrapped(body - angle)).collect();
         let mut found = Vec::new();
@@ -153,7 +154,7 @@ struct Dive {
 }
 
 impl Dive {
-    /// All passes of a body angle within the common chainages, in order.
+    /// All passes over a body angle within the common chainages, in order.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let mut all: Vec<f64> = self.tracks.iter().flat_map(|track| track.passes(angle)).collect();
         all.retain(|&m| m > self.shared_m[0] - SAME_M && m < self.shared_m[1] + SAME_M);
@@ -161,7 +162,7 @@ impl Dive {
         all
     }
 
-    /// Checks that passes of an angle are `apart_m` apart from end to end.
+    /// Checks that the passes over an angle are `apart_m` apart from one end to the other.
     fn assert_even(&self, angle: f64, apart_m: f64) {
         let (all, [first, last]) = (self.passes(angle), self.shared_m);
         assert!(all.len() > 3 && all[0] - first < apart_m + SAME_M, "{all:?} from {first}");
@@ -171,7 +172,7 @@ impl Dive {
         }
     }
 
-    /// Checks that at each place all heads have the same phase in their sectors.
+    /// Checks that at any chainage all heads are at the same position within their sectors.
     fn assert_in_step(&self, within_rad: f64) {
         let [first, last] = self.shared_m;
         for place_m in (0..200).map(|n| first + (last - first) * f64::from(n) / 200.3) {
@@ -183,19 +184,19 @@ impl Dive {
         }
     }
 
-    /// Checks that a head passes each angle of its own sector at two alternating distances, and no other head passes
-    /// it.
+    /// Checks that only head `k` passes the angles of its own sector, and that it does so at two alternating
+    /// distances.
     fn assert_two_distances(&self, k: usize, pitch_m: f64) {
         let heads = self.tracks.len();
         for share in [0.0, 0.03, 0.25, 0.4, 0.5, 0.75, 0.9, 1.0] {
             let angle = TAU * (k as f64 + share) / heads as f64;
             let mut own = self.tracks[k].passes(angle);
             if [0.0, 1.0].contains(&share) {
-                // Two passes meet at a turning point.
+                // At a turning point, two passes coincide.
                 own = own.iter().flat_map(|&m| [m, m]).collect();
             } else {
                 let by = |track: &&Track| !track.passes(angle).is_empty();
-                assert_eq!(self.tracks.iter().filter(by).count(), 1, "sector {k} isn't only its head's");
+                assert_eq!(self.tracks.iter().filter(by).count(), 1, "another head passes sector {k}");
             }
             let [small, large] = alternating_m(pitch_m, heads, share).unwrap();
             assert!(gaps(&own).len() > 3 * heads && small >= 0.0, "{own:?}, {small}");
@@ -215,7 +216,7 @@ fn gaps(passes: &[f64]) -> Vec<f64> {
     passes.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// Hulls with heads together, evenly spaced, and unevenly spaced in no order.
+/// Hulls with all heads at one place, with evenly spaced heads, and with unevenly spaced heads in mixed order.
 fn hulls(heads: usize) -> [Vec<f64>; 3] {
     let uneven = [0.4, -0.71, 1.102, 0.05, -0.33, 0.62];
     [vec![0.3; heads], (0..heads).map(|k| -0.3 * k as f64).collect(), uneven[..heads].to_vec()]
@@ -232,7 +233,7 @@ fn random_rig() -> impl Strategy<Value = Rig> {
 }
 
 #[test]
-fn phase_shifted_heads_pass_each_angle_at_even_distances() {
+fn phase_shifted_heads_pass_each_angle_at_equal_distances() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for (hull_m, speed_mps) in hulls(heads).iter().flat_map(|hull_m| SPEEDS_MPS.map(|v| (hull_m, v))) {
             let dive = Rig::new(hull_m, facing, 8.0).dive(PhaseShift, speed_mps, speed_mps);
@@ -248,7 +249,8 @@ fn sectors_are_swept_at_two_alternating_distances_in_phase() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;
-            // Distances of whole pings, so that all heads pass a place at the same steps.
+            // The distances between heads are whole numbers of pings, so that all heads pass a chainage at the same
+            // steps.
             let hull_m =
                 [37, 0, 251, 90, 90, 163].map(|pings| -f64::from(pings) * pitch_m / f64::from(STEPS));
             let rig = Rig::new(&hull_m[..heads], facing, 21.6);
@@ -257,10 +259,10 @@ fn sectors_are_swept_at_two_alternating_distances_in_phase() {
             dive.assert_in_step(1e-7);
             for k in 0..heads {
                 dive.assert_two_distances(k, pitch_m);
-                // Both neighbours turn round there, half a sweep apart.
+                // At the border of two sectors, both heads turn round, half a sweep apart.
                 dive.assert_even(TAU * (k + 1) as f64 / heads as f64, pitch_m / heads as f64);
             }
-            // Elsewhere a head reaches the end of its sector up to a ping early or late.
+            // With other distances, a head may reach the end of its sector up to one ping early or late.
             for hull_m in hulls(heads) {
                 let rig = Rig::new(&hull_m, facing, 21.6);
                 rig.dive(SectorOffset, speed_mps, speed_mps).assert_in_step(rig.step_rad());
@@ -269,8 +271,8 @@ fn sectors_are_swept_at_two_alternating_distances_in_phase() {
     }
 }
 
-/// Steps of 2.4 degrees in quarters of a turn, and of 0.9 degrees in thirds. The short last step makes the sweep
-/// longer than 2 T / s.
+/// The cases are steps of 2.4 degrees in quarters of a turn, and steps of 0.9 degrees in thirds. The shorter last
+/// step makes the sweep longer than 2 T / s.
 #[test]
 fn sectors_not_divisible_by_the_step_are_in_phase_within_two_pings() {
     for (steps, heads, turn_s) in [(150, 4, 4.8), (400, 3, 8.0)] {
@@ -288,7 +290,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
         let program = HeadProgram { start_rad: 0.0, growing: true, sector: Some((0.0, size)) };
         let ping_m = speed_mps * rig.ping_s();
         let lead = Track { x_m: 0.0, ping_m, body: walk(&program, rig.step_rad(), 8 * STEPS) };
-        // From the chainage where both have been, in odd fractions of a ping.
+        // The chainages begin where both heads have been, and are 1.37 pings apart.
         for now_m in (0..150).map(|n| 3.8 + f64::from(n) * 1.37 * ping_m) {
             let state = |m: f64| (lead.body_at(m), lead.body_at(m + SAME_M) > lead.body_at(m));
             let ((angle_rad, growing), (along, outward)) = (state(now_m), state(now_m - behind_m));
@@ -299,7 +301,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
                 let off = wrapped(body - along - number as f64 * size);
                 assert!(off.abs() < 1e-8, "{sector:?} {off} off, lead at {angle_rad} {growing}");
                 assert!((0.0..TAU).contains(&got.angle_rad), "{got:?}");
-                // At a turning point it has both directions.
+                // At a turning point, both directions are right.
                 if along > 1e-5 && along < size - 1e-5 {
                     assert_eq!(got.growing, outward != reversed, "{sector:?}, lead {angle_rad} {growing}");
                 }
@@ -309,13 +311,13 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
 }
 
 #[test]
-fn faster_vehicle_has_gaps_uneven_by_the_phase_errors() {
+fn gaps_of_a_faster_vehicle_differ_by_the_phase_errors() {
     let (turn_s, planned_mps, speed_mps) = (8.0, 0.197, 0.25);
     let pitch_m = speed_mps * turn_s;
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for hull_m in &hulls(heads)[1..] {
             let dive = Rig::new(hull_m, facing, turn_s).dive(PhaseShift, planned_mps, speed_mps);
-            // Delay of a head at a place besides its phase, turns: x / (v T) - x / (v' T).
+            // Delay of a head at a place in addition to its phase, turns: x / (v T) - x / (v' T).
             let late = |x_m: f64| (ends(hull_m)[1] - x_m) * (1.0 / planned_mps - 1.0 / speed_mps) / turn_s;
             let first: Vec<f64> = dive.tracks.iter().map(|track| track.passes(1.0)[0]).collect();
             for k in 1..heads {
@@ -331,7 +333,7 @@ fn faster_vehicle_has_gaps_uneven_by_the_phase_errors() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        // A fixed seed: one start in a million is so near to a step that rounding decides its ping.
+        // The seed is fixed, because one start in a million is so close to a step that rounding decides its ping.
         cases: 100, failure_persistence: None, rng_seed: RngSeed::Fixed(881), ..ProptestConfig::default()
     })]
 
@@ -341,7 +343,7 @@ proptest! {
         rig.dive(PhaseShift, speed_mps, speed_mps).assert_even(angle, apart_m);
     }
 
-    /// At a speed other than the planned one, so that gaps differ.
+    /// The speed differs from the planned one, so that the gaps differ from each other.
     #[test]
     fn shifting_or_reversing_all_heads_does_not_change_the_gaps(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]),
@@ -383,7 +385,8 @@ fn sector_of_12_5_steps_ends_with_a_half_step_and_pings_each_end_once() {
     let out = (0..13).map(|n| 7.2 * f64::from(n));
     let sweep: Vec<f64> = out.clone().chain(out.map(|degrees| 90.0 - degrees)).collect();
     for (n, degrees) in (0..1000).zip(sweep.iter().cycle()) {
-        // From the exact nanosecond of a ping, although 0.3 / 0.1 is below 3, to a microsecond before the next.
+        // A ping's angle must hold from its exact nanosecond to a microsecond before the next ping, although 0.3 /
+        // 0.1 is rounded to below 3.
         for ns in [100_000_000 * n, 100_000_000 * n + 99_999_000] {
             let got = schedule.angle_rad(0, DurNs(ns)).unwrap().to_degrees();
             assert!((got - degrees).abs() < 1e-6, "{got} for {degrees} at {ns} ns");
@@ -436,6 +439,6 @@ fn lead_outside_sector_0_is_a_named_error() {
     let sector = Sector { number: 1, of: 4, behind_m: 0.3, reversed: false };
     for angle_rad in [-0.1, 1.6, 6.2, f64::NAN] {
         let got = in_step(InSector { angle_rad, growing: true }, &sector, 8.0, 0.2);
-        assert!(got.is_err(), "a lead at {angle_rad} of 0 to a quarter turn gives {got:?}");
+        assert!(got.is_err(), "a lead at {angle_rad}, outside 0 to a quarter turn, gives {got:?}");
     }
 }

@@ -1,4 +1,5 @@
-//! Sampling theory, plans and advice: equations compared with independent values, and promises with simulated dives.
+//! Sampling theory, plans and advice. Equations are compared with independent values, and promises with simulated
+//! dives.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 

@@ -1,8 +1,9 @@
-//! Sampling theory compared with values of 50 digits, made with mpmath by `oracles/sampling.py`
+//! Sampling theory compared with values of 50 digits, which `oracles/sampling.py` computed with mpmath
 //! (`oracles/sampling.csv`).
 //!
-//! Inputs are doubles taken as exact. So each tolerance is the rounding within the computation: some units in the
-//! last place, times the condition number if an input's own rounding would matter.
+//! The inputs are doubles and count as exact. So the tolerance only covers rounding in the computation. It is some
+//! units in the last place, times the condition number if the rounding of an intermediate value matters like that of
+//! an input.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
@@ -26,7 +27,7 @@ struct Row {
 }
 
 impl Row {
-    /// Input `i`, counted from 1 as in the file's header.
+    /// Input `i`. The numbers begin with 1, as in the file's header.
     fn i(&self, i: usize) -> f64 {
         self.inputs[i - 1]
     }
@@ -35,7 +36,7 @@ impl Row {
         u32::try_from(math::round_to_i64(self.i(i))).unwrap()
     }
 
-    /// Checks `got` against the value, with an absolute tolerance.
+    /// Checks `got` against the oracle's value with an absolute tolerance.
     fn near(&self, got: f64, tolerance: f64) {
         let off = (got - self.value).abs();
         assert!(
@@ -48,24 +49,24 @@ impl Row {
         );
     }
 
-    /// Checks `got` to within some units in the last place.
+    /// Checks `got` to some units in the last place.
     fn ulps(&self, got: f64, ulps: f64) {
         self.near(got, ulps * ULP * self.value.abs());
     }
 
-    /// Error of `got` as a share of the value.
+    /// Relative error of `got`.
     fn share(&self, got: f64) -> f64 {
         (got - self.value).abs() / self.value.abs().max(f64::MIN_POSITIVE)
     }
 
-    /// Checks `got` on a circle of this circumference.
+    /// Checks a place `got` on a circle of this circumference.
     fn around(&self, got: f64, modulus: f64, tolerance: f64) {
         let off = math::wrap_signed(got - self.value, modulus);
         self.near(self.value + off, tolerance);
     }
 }
 
-/// Rows of these cases, which must exist.
+/// Rows of the cases with these names, which must exist.
 fn rows(cases: &[&str]) -> Vec<Row> {
     let mut found = Vec::new();
     for (number, line) in ROWS.lines().enumerate() {
@@ -88,12 +89,12 @@ fn rows(cases: &[&str]) -> Vec<Row> {
     found
 }
 
-/// Factor by which the rounding of an angle near 90 degrees is magnified.
+/// Factor by which rounding of an angle near 90 degrees is magnified.
 fn condition(angle_rad: f64) -> f64 {
     1.0 + angle_rad / (FRAC_PI_2 - angle_rad).abs()
 }
 
-/// Near 90 degrees the tangent is unbounded, and the difference of two tangents would lose all digits.
+/// Near 90 degrees the tangent is unbounded, so the difference of two tangents would lose all digits.
 #[test]
 fn steps_near_90_degrees_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
@@ -104,7 +105,7 @@ fn steps_near_90_degrees_match_the_oracle() {
     found_at("sampling.corner", magnified, worst, 8.0 * ULP);
 }
 
-/// As T_y approaches the target, the difference of their squares would cancel.
+/// If T_y is close to the target, the difference of their squares would lose digits by cancellation.
 #[test]
 fn speeds_near_the_limit_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
@@ -118,7 +119,7 @@ fn speeds_near_the_limit_match_the_oracle() {
     found_at("sampling.speed", magnified, worst, 8.0 * ULP);
 }
 
-/// At a crawl, a head makes any number of turns until the vehicle reaches another head's former position.
+/// At a crawl, a head makes very many turns before the vehicle reaches the former position of another head.
 #[test]
 fn phases_at_a_crawl_match_the_oracle() {
     let (mut worst_rad, mut turned_most) = (0.0_f64, 0.0_f64);
@@ -138,7 +139,8 @@ fn cross_section_matches_the_oracle() {
     for row in rows(&["eq5", "eq6", "eq7", "eq8", "eq10", "eq22"]) {
         match row.case.as_str() {
             "eq5" => row.ulps(section::t_y1_m(row.i(1), row.i(2)).unwrap(), 8.0),
-            // Kept to twice a double's precision: no magnification, however near to 90 degrees.
+            // These values are computed with twice a double's precision, so errors aren't magnified, even near 90
+            // degrees.
             "eq6" => row.ulps(section::t_y2_m(row.i(1), row.i(2), row.count(3)).unwrap(), 8.0),
             "eq7" => row.ulps(section::t_c_m(row.i(1), row.i(2)).unwrap(), 4.0),
             "eq8" => row.ulps(section::t_y2_mean_m(row.i(1), row.i(2), row.count(3)).unwrap(), 8.0),
@@ -158,7 +160,7 @@ fn footprint_matches_the_oracle() {
 #[test]
 fn forward_motion_matches_the_oracle() {
     for row in rows(&["eq11", "eq12", "eq13", "eq15", "eq16", "eq17", "eq18", "eq16_speed"]) {
-        // A head with one step a turn pings once per period.
+        // A head with one step per turn pings once per turn period.
         let once = |speed, period| Spiral::new(speed, Turn::new(TAU, period).unwrap(), 1.0).unwrap();
         match row.case.as_str() {
             "eq11" => row.ulps(once(row.i(1), row.i(2)).advance_m(), 2.0),
@@ -231,7 +233,7 @@ fn beam_wall_hits_match_the_oracle() {
     for row in rows(&["cast_x", "cast_y", "cast_z", "cast_sigma"]) {
         let profile = shape(row.i(1));
         let hit = sounding(&profile, &row, row.i(6));
-        // At oblique incidence, rounding of a beam moves its end along the wall by a larger factor.
+        // At oblique incidence, the rounding of a beam's direction moves its end along the wall by a larger factor.
         let tolerance = 64.0 * ULP * (3.0 + hit.range_m()) / hit.squareness;
         match row.case.as_str() {
             "cast_x" => row.near(hit.beam.x(), tolerance),

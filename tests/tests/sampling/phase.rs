@@ -1,16 +1,18 @@
-//! Heads apart along the hull are in phase at one speed only; at another speed the advice reports their phase error.
+//! Heads that are apart along the hull are in phase at one speed only. At any other speed the advice reports their
+//! phase error.
 
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// VITA 2 with two heads: FAST, 8 s a turn, 1.102 m apart along the hull.
+/// VITA 2 with two heads in mode FAST (8 s per turn), 1.102 m apart along the hull.
 const VEHICLE: &str = include_str!("../../../deploy/vehicles/vita2-2.toml");
 const APART_M: f64 = 1.102;
 const TURN_S: f64 = 8.0;
 const PLANNED_MPS: f64 = 0.197;
 
-/// Advice in a dive at constant speed, without its first seconds. Nothing disturbs its sensors, so the speed is known
-/// without a filter, which would add a margin for slack.
+/// Advice in a dive at constant speed, without the first seconds.
+///
+/// No effect disturbs the sensors, so the speed is known without a filter. A filter would add a margin for slack.
 fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
     let folder = Folder::new();
     let direct = "[navigation]\nway = \"direct\"\n";
@@ -40,7 +42,7 @@ fn phase_error_follows_from_the_change_of_speed() {
         for entry in &advice {
             let error_deg = entry["phase_error_deg"].as_f64().unwrap();
             let off = (error_deg / 360.0 - turns + 0.5).rem_euclid(1.0) - 0.5;
-            // Heads step by 0.9 degrees, and start angles are rounded to 0.3.
+            // The tolerance covers the head's steps of 0.9 degrees, and start angles rounded to 0.3 degrees.
             assert!(off.abs() * 360.0 < 1.5, "{speed_mps} m/s: {error_deg} degrees, not {}", turns * 360.0);
         }
     }

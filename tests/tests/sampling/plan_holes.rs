@@ -1,8 +1,9 @@
-//! A plan's promised hole compared with simulated beams.
+//! The hole that a plan promises, compared with simulated beams.
 //!
-//! Heads are stepped by their schedule, their beams are cast, and the largest empty circle is searched. Occlusion by
-//! the vehicle is found by following beams step by step. The search can only underestimate, so no circle may exceed
-//! the promise. The promise may be at most twice the circle found, or it would waste the crew's time.
+//! Heads are stepped by their schedule and their beams are cast. Then the largest empty circle is searched. Occlusion
+//! by the vehicle is found by following each beam in small steps. The search can only underestimate, so no found
+//! circle may exceed the promise. The promise may be at most twice the found circle, because a larger one would waste
+//! the crew's time.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Vec3};
 use headrace_geometry::math::{self, PI, TAU};
@@ -18,7 +19,7 @@ const MODES: [(&str, f64, f64); 3] = [("medium", 0.6, 10.8), ("fast", 0.9, 8.0),
 
 type Head = (HeadSpec, Vec<HeadMode>);
 
-/// A head at a place of the vehicle, facing forward or aft, with turns longer by the factor `slower`.
+/// A head at a place of the vehicle. It faces forward or aft, and its turn time is longer by the factor `slower`.
 fn head(place: [f64; 3], aft: bool, radius_m: f64, slower: f64) -> Head {
     let mode = |(name, step_deg, turn_s): (&'static str, f64, f64)| HeadMode {
         name,
@@ -72,24 +73,25 @@ fn ceran(heads: Vec<Head>, layout: HeadLayout) -> Inspection {
     inspection(shapes::ceran().unwrap(), heads, layout)
 }
 
-/// Lateral position and heading of the vehicle by time; its chainage grows steadily.
+/// Lateral position and heading of the vehicle as functions of time. Its speed along the tunnel is constant.
 type Way = fn(f64) -> (f64, f64);
 
 fn straight(_: f64) -> (f64, f64) {
     (0.0, 0.0)
 }
 
-/// Step along a beam, m: short enough that at least two steps meet the sliver of 5 mm.
+/// Step along a beam, m. It is so short that at least two steps meet the thinnest part of 5 mm.
 const STEP_M: f64 = 0.002;
-/// Largest distance of a part of the vehicle from a head, m.
+/// Largest distance between a head and a part of the vehicle, m.
 const VEHICLE_M: f64 = 1.6;
 
-/// Whether a beam ends at the vehicle, found in steps along it. A head's own body and a box that contains the head
-/// hide nothing.
+/// Whether the vehicle hides the wall from a beam, found in steps along the beam. A head's own body hides nothing,
+/// nor does a box that contains the head.
 fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
     let (spec, _) = &inspection.heads[number];
     let from = spec.mount.position;
-    // 0 is down and grows clockwise seen from behind the head; one that faces aft is turned about the vertical.
+    // Angle 0 points down, and angles grow clockwise as seen from behind the head. A head that faces aft is turned
+    // about the vertical.
     let (sine, cosine) = math::sin_cos(angle_rad);
     let towards = spec.mount.rotation * Vec3::new(0.0, sine, -cosine);
     let others = || inspection.heads.iter().enumerate().filter(|(other, _)| *other != number);
@@ -110,12 +112,12 @@ fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
 }
 
 fn in_box(part: &Obstacle, at: Vec3<Body>) -> bool {
-    let Obstacle::Box { least, most } = part else { panic!("hulls are of boxes here") };
+    let Obstacle::Box { least, most } = part else { panic!("hulls consist of boxes here") };
     let within = |axis: fn(&Vec3<Body>) -> f64| (axis(least)..=axis(most)).contains(&axis(&at));
     within(Vec3::x) && within(Vec3::y) && within(Vec3::z)
 }
 
-/// Samples (chainage, arc length) of a dive over `length_m`.
+/// Samples of a dive over `length_m` as chainage and arc length.
 fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: Way) -> Vec<[f64; 2]> {
     let schedule = planner.schedule(mode, speed_mps).unwrap();
     let inspection = planner.inspection();
@@ -143,7 +145,7 @@ fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: W
     samples
 }
 
-/// Samples in square cells for a nearest-neighbour search; arc length is cyclic.
+/// Samples in square cells for a nearest-neighbour search with cyclic arc length.
 struct Wall {
     cells: Vec<Vec<[f64; 2]>>,
     from_m: f64,
@@ -206,7 +208,7 @@ impl Wall {
         best
     }
 
-    /// Diameter of the largest empty circle found with its centre from `from_m` to `to_m`, m.
+    /// Diameter of the largest empty circle found with a centre from `from_m` to `to_m`, m.
     fn hole_m(&self, from_m: f64, to_m: f64, grid_m: f64) -> f64 {
         let across = math::floor_to_i64((to_m - from_m) / grid_m);
         let around = math::floor_to_i64(self.perimeter_m / grid_m);
@@ -240,13 +242,13 @@ impl Wall {
     }
 }
 
-/// Hole over promise at the planned speed for a target.
+/// Ratio of the found hole to the target, at the speed that the plan gives for this target.
 fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     let planner = Planner::new(inspection).unwrap();
     let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();
     let speed_mps = planner.v_max_mps(number, target_m).unwrap();
     let pitch_m = speed_mps * planner.modes()[number].mode.turn.period_s();
-    // The ends, which not all heads have passed, are left out.
+    // The ends are left out, because not all heads have passed there.
     let from_m = pitch_m + 6.0;
     let to_m = from_m + pitch_m;
     let samples = samples(&planner, number, speed_mps, to_m + pitch_m + 6.0, way);
@@ -254,7 +256,7 @@ fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     wall.hole_m(from_m, to_m, target_m / 8.0) / target_m
 }
 
-/// Checks that every case keeps its promise, with a ratio of `least` at least.
+/// Checks that no case exceeds its promise, and that each ratio is at least `least`.
 fn hold(cases: Vec<(&str, Inspection, &str, f64, Way)>, least: f64) {
     let mut broken = Vec::new();
     for (what, inspection, mode, target_m, way) in cases {
@@ -330,7 +332,7 @@ fn plan_bounds_the_hole_of_an_askew_vehicle() {
 
 #[test]
 fn plan_bounds_the_hole_of_a_swinging_and_drifting_vehicle() {
-    // 5 degrees either way in 30 s turns at up to 1.05 degrees a second.
+    // An oscillation by 5 degrees either way in 30 s has a largest rate of 1.05 degrees a second.
     let swings = |yaw_deg: f64, rate_degps: f64, heads| Inspection {
         yaw_rad: yaw_deg.to_radians(),
         yaw_rate_radps: rate_degps.to_radians(),
@@ -338,8 +340,8 @@ fn plan_bounds_the_hole_of_a_swinging_and_drifting_vehicle() {
     };
     let swinging = |heads| swings(5.0, 1.05, heads);
     let swing: Way = |t| (0.0, f64::to_radians(5.0) * math::sin(TAU * t / 30.0));
-    // 15 degrees either way in 20 s. At the largest rate throughout a turn of MEDIUM the swing would be 51 degrees,
-    // but it is 30 at most.
+    // The oscillation is 15 degrees either way in 20 s. At its largest rate, the heading would change by 51 degrees
+    // in a turn of MEDIUM, but it changes by 30 degrees at most.
     let swing_wide: Way = |t| (0.0, f64::to_radians(15.0) * math::sin(TAU * t / 20.0));
     let drifting = |heads| Inspection { drift_m: 1.5, ..ceran(heads, PhaseShift) };
     hold(

@@ -1,4 +1,5 @@
-//! A simulated pilot with advice: hurries, gets a missed stretch reported, goes back, and leaves no missed section.
+//! A simulated pilot who gets advice. The pilot hurries, is shown a missed stretch, goes back, and leaves no missed
+//! section.
 
 use headrace_simulator::{Message, Scene, Simulation};
 use headrace_tests::{scenes, truth};
@@ -60,7 +61,7 @@ fn pilot_keeps_to_the_advised_speed_within_tolerance() {
     let way = way(&scene);
     let report = truth::dive(&scene).report;
     let told = &report.advice;
-    // Once under way.
+    // The vehicle is under way in these seconds.
     for (second, pair) in way.windows(2).enumerate().skip(40).take(60) {
         let speed_mps = pair[1] - pair[0];
         let about = told.iter().filter(|entry| (entry.at_s - second as f64).abs() < 12.0);

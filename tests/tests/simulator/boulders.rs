@@ -1,7 +1,6 @@
-//! A hole D promises that no boulder of size D is missed, and that one of 2 D is hit at least twice.
+//! A hole D promises that no boulder of size D is missed, and that every boulder of size 2 D is hit at least twice.
 //!
-//! A thousand boulders lie on the wall of a simulated tunnel; holes are those that the loop measures on the bare
-//! wall.
+//! A thousand boulders lie on the wall of a simulated tunnel. D comes from the loop's holes on the bare wall.
 
 use std::fmt::Write as _;
 
@@ -9,10 +8,10 @@ use headrace_simulator::environment::What;
 use headrace_simulator::{Scene, Simulation};
 use headrace_tests::scenes;
 
-/// Distance between neighbouring boulders, m: no beam across the tunnel meets two of them.
+/// Distance between neighbouring boulders, m. It is so large that no beam across the tunnel can meet two of them.
 const SPACING_M: f64 = 2.5;
 const COUNT: usize = 1000;
-/// VITA 2 with four heads in the fastest mode; without effects nothing is occluded.
+/// VITA 2 with four heads in the fastest mode. The scene has no effects, so nothing is occluded.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nsensors.all.mode = \"fastest\"\n\
     heads.planned_speed_mps = 0.5\ntarget_m = 3.0\n[trajectory]\nstart_m = 10\n[[trajectory.legs]]\n\
     distance_m = 2520\nspeed_mps = 0.5\n[effects]\nmotion_within_turn = {}\n";
@@ -21,7 +20,7 @@ fn scene(rest: &str) -> Scene {
     scenes::scene(&format!("{SCENE}{rest}"))
 }
 
-/// Hole of each section of the bare tunnel, m: chainage of its start, and D.
+/// Sections of the bare tunnel: chainage of the start, and D, m.
 fn holes() -> Vec<(f64, f64)> {
     let report = scenes::report(&scene(""));
     report.sections.iter().filter_map(|section| Some((section.start_m, section.hole_m?))).collect()
@@ -37,7 +36,8 @@ impl Numbers {
     }
 }
 
-/// Number of hits of each boulder. Boulders are half sunk in the wall, anywhere round it, with `times` D in size.
+/// Number of hits of each boulder. Boulders are anywhere round the wall, half sunk in it, and have `times` D as their
+/// size.
 fn hits(holes: &[(f64, f64)], seed: u64, times: std::ops::Range<f64>) -> Vec<usize> {
     let mut numbers = Numbers(seed);
     let perimeter_m = scene("").vehicle.tunnel.profile.perimeter_m();
@@ -68,14 +68,14 @@ fn hits(holes: &[(f64, f64)], seed: u64, times: std::ops::Range<f64>) -> Vec<usi
 }
 
 #[test]
-fn boulders_of_d_are_hit_and_boulders_of_two_d_twice() {
+fn boulders_of_size_d_are_hit_once_and_boulders_of_two_d_are_hit_twice() {
     let holes = holes();
     let least = |hits: &[usize]| *hits.iter().min().unwrap();
     let of_d = hits(&holes, 1, 1.01..1.3);
     assert!(least(&of_d) >= 1, "{} boulders of D missed", of_d.iter().filter(|hits| **hits == 0).count());
     let of_two_d = hits(&holes, 2, 2.02..2.2);
     assert!(least(&of_two_d) >= 2, "a boulder of 2 D was hit {} times", least(&of_two_d));
-    // The promise isn't trivial: boulders much smaller than the holes are missed at times.
+    // The promise isn't trivial, because some boulders that are much smaller than the holes are missed.
     let small = hits(&holes, 3, 0.3..0.4);
-    assert!(small.iter().filter(|hits| **hits == 0).count() > COUNT / 20, "holes are smaller than they say");
+    assert!(small.iter().filter(|hits| **hits == 0).count() > COUNT / 20, "the reported holes are too large");
 }

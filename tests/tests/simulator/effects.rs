@@ -1,4 +1,4 @@
-//! A scene pays only for the effects that it names; an unnamed effect changes no bit.
+//! Only the effects that a scene names cost time, and an effect that isn't named changes no bit.
 
 use std::collections::BTreeMap;
 
@@ -65,7 +65,7 @@ fn random_draws_of_an_effect_do_not_depend_on_others() {
     let together = lines(&folder, &format!("{others}\n{noise}"), &[]);
     assert_eq!(alone["/raw/sonar_0"], together["/raw/sonar_0"]);
     assert_ne!(alone["/raw/imu"], together["/raw/imu"]);
-    // The order in the scene doesn't matter either.
+    // The order of effects in the scene doesn't matter either.
     assert_eq!(lines(&folder, &format!("{noise}\n{others}"), &[]), together);
 }
 
@@ -125,13 +125,13 @@ fn only_named_effects_have_systems_components_and_streams() {
     assert_eq!(effect["systems"].as_array().unwrap().len(), 1);
     assert_eq!(effect["components"][0]["sensors"], serde_json::json!(["sonar_1"]));
     assert_eq!(effect["streams"], serde_json::json!(["sonar_1"]));
-    // A base system takes a turn's snapshot; the effect replaces it.
+    // A base system holds the aim during a turn. The effect replaces this system.
     let moving = explained(&folder, "motion_within_turn = {}");
     assert_eq!(moving["base"].as_array().unwrap().len(), base - 1);
     assert_eq!(moving["effects"][0]["replaces"], serde_json::json!(["aim_held"]));
 }
 
-/// Effects that the scene calls for are listed with their reason, and simulated only if the scene says so.
+/// Effects that a scene calls for are listed with their reasons. They are simulated only if the scene requests it.
 #[test]
 fn called_effects_are_listed_and_simulated_only_on_request() {
     let folder = folder();
@@ -159,15 +159,16 @@ fn called_effects_are_listed_and_simulated_only_on_request() {
         (fate("beam_cone"), fate("imu_bias"), fate("occlusion")),
         ("left".into(), "as named".into(), "taken".into())
     );
-    // No byte differs from the scene without the unused descriptions.
+    // Descriptions that no effect uses change no byte.
     let plain = lines(&folder, "", &[]);
     let described = "\n[water]\ntemperature_degc = 4\n[[water.murk]]\nfrom_m = 1\nto_m = 9\nsilt_gpl = 3\n[cable]\nslack_m = 1\n";
     assert_eq!(lines(&folder, described, &[]), plain);
 }
 
-/// An effect without influence is free, and one that shifts ranges isn't. The price is CPU time.
+/// The report must show no influence for one effect, and a large one for another. The price of an effect is its CPU
+/// time.
 #[test]
-fn worth_separates_effects_that_matter_from_others() {
+fn explained_worth_separates_effects_with_influence_from_others() {
     let folder = folder();
     let effects = "motion_within_turn = {}\nimu_noise = { gyro_degps_rthz = 1e-7 }\nmissing_returns = { share = 0.5, mean_run = 9 }";
     folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));
@@ -190,7 +191,7 @@ fn worth_separates_effects_that_matter_from_others() {
     assert!(one.code == Some(2) && one.stderr.contains("seeds"), "{}", one.stderr);
 }
 
-/// Checks for exit code 2 and these words.
+/// Checks that the program exits with code 2 and prints these words.
 #[track_caller]
 fn refused(scene: &str, words: &[&str]) {
     let folder = folder();
@@ -259,7 +260,7 @@ fn report_finds_the_simulated_clock_drifts() {
             let clock = &sources.iter().find(|source| source["id"] == id).unwrap()["device_clock"];
             let number = |key: &str| clock[key].as_f64().unwrap();
             assert_eq!((&clock["restarts"], &clock["jumps"]), (&0.into(), &0.into()), "{id}");
-            // An effect's seconds are longer than true ones, so its clock is slow.
+            // The effect makes a device's seconds longer than true ones, so the device's clock is slow.
             let (error, sd) = (number("drift_ppm") + ppm, number("drift_sd_ppm"));
             assert!(error.abs() < 5.0 * sd && sd < 30.0, "{id}: {clock}");
         }
@@ -268,13 +269,13 @@ fn report_finds_the_simulated_clock_drifts() {
     }
 }
 
-/// A vehicle file with a speed of sound wrong by 3.7 % shifts the wall by 11 cm. Corrected by the depth sensor's
-/// temperature, the wall is right.
+/// If the speed of sound in the vehicle file is wrong by 3.7 %, the wall shifts by 11 cm. The depth sensor's
+/// temperature corrects the speed, and the wall is right.
 #[test]
 fn water_temperature_corrects_a_wrong_speed_of_sound() {
     let folder = folder();
-    // The emulated depth sensor is in water of 10 degrees, in which sound travels at 1447.3 m/s, and slightly faster
-    // deeper down.
+    // The emulated depth sensor is in water of 10 degrees. Sound travels there at 1447.3 m/s, and slightly faster at
+    // greater depth.
     let effects = "motion_within_turn = {}\nsound_speed_error = { true_mps = 1448.1 }\n";
     let mean_m = |water: &str| {
         folder.write("vehicle.toml", VEHICLE.replace("sound_speed_mps = 1447", water));
@@ -301,7 +302,7 @@ fn water_temperature_corrects_a_wrong_speed_of_sound() {
     assert!((1447.0..1449.0).contains(&least_mps) && most_mps < 1449.0, "{least_mps} to {most_mps}");
 }
 
-/// Pings of a head that an effect alone removed or displaced.
+/// Whether this effect alone removes or displaces each ping of a head.
 fn touched(effect: &str) -> Vec<bool> {
     let ranges = |effects: &str| -> Vec<Option<f64>> {
         let scene = format!("{SCENE}\n[effects]\n{effects}\n");
@@ -324,8 +325,8 @@ fn random_draws_of_two_effects_are_independent() {
     let stray = touched("outliers = { share = 0.3, sensors = [\"sonar_0\"] }");
     assert!(lost.len() > 500 && (share(&lost) - 0.3).abs() < 0.1 && (share(&stray) - 0.3).abs() < 0.1);
     let both: Vec<bool> = lost.iter().zip(&stray).map(|(a, b)| *a && *b).collect();
-    // With a shared stream the overlap would be the whole smaller set; with separate streams it is 0.09 within five
-    // standard deviations.
+    // If both effects shared a random stream, the overlap would be the whole smaller set. With separate streams it is
+    // 0.09, right to five standard deviations.
     let sd = (0.09_f64 * 0.91 / both.len() as f64).sqrt();
     assert!((share(&both) - 0.09).abs() < 5.0 * sd + 0.01, "{}", share(&both));
 }

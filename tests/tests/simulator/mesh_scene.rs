@@ -1,10 +1,10 @@
-//! Scenes with meshes, run through the program.
+//! Scenes with meshes, simulated by the program.
 
 use std::fmt::Write as _;
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 
-/// A box of 1 m as PLY, standing on its lower side.
+/// A box of 1 m as PLY, standing on its lower face.
 fn cuboid() -> String {
     let mut text = String::from(
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
@@ -24,7 +24,7 @@ fn folder(keys: &str) -> Folder {
     folder
 }
 
-/// Values of one column of the truth, from the rows whose `key` column has `value`.
+/// Values of one column of the ground truth, from rows with `value` in the column `key`.
 fn column(truth: &str, (key, value): (&str, &str), wanted: &str) -> Vec<String> {
     let mut rows = truth.lines().skip_while(|line| line.starts_with('#'));
     let columns: Vec<&str> = rows.next().unwrap().split(',').collect();
@@ -47,7 +47,7 @@ fn sounder_measures_a_body_on_the_floor() {
     let mut over = 0;
     for (chainage, height) in chainages.iter().zip(&heights) {
         let (chainage_m, height_m): (f64, f64) = (chainage.parse().unwrap(), height.parse().unwrap());
-        // The sounder looks straight down from close to the vehicle's position.
+        // The echosounder looks straight down and is close to the vehicle's position.
         if (chainage_m - 5.0).abs() < 0.45 {
             over += 1;
             assert!((height_m - 1.0).abs() < 1e-9, "{chainage_m}: {height_m}");
@@ -56,7 +56,7 @@ fn sounder_measures_a_body_on_the_floor() {
         }
     }
     assert!(over > 5, "{over}");
-    assert!(truth.contains("car"), "the truth names what was met");
+    assert!(truth.contains("car"), "the truth doesn't name the body that the beam met");
 }
 
 #[test]

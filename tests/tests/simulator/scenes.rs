@@ -1,4 +1,4 @@
-//! The shipped scenes: each can be simulated, and names only parts that its vehicle has.
+//! The shipped scenes. Each scene can be simulated, and names only parts that its vehicle has.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ fn every_shipped_scene_can_be_simulated() {
     }
 }
 
-/// The page of the scenes has the same lengths as their dives.
+/// The page about the scenes must state the true lengths of their dives.
 #[test]
 fn shipped_scenes_match_the_figures_of_their_page() {
     let folder = headrace_tests::root().join("deploy/scenes");

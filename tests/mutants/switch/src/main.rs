@@ -33,7 +33,7 @@ struct MutantSpan {
     start: Position,
 }
 
-/// Line and column, both from 1, the column in characters.
+/// Line and column, both counted from 1; the column counts characters.
 #[derive(Deserialize, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Position {
     line: usize,
@@ -73,12 +73,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Source text of a file, with the places to rewrite.
+/// Source text of a file, with the places to be rewritten.
 struct Text<'a> {
     source: &'a str,
     /// Outer places come before the places inside them.
     places: &'a [Place],
-    /// Mutants of each place, by the index of the place.
+    /// Mutants of each place, keyed by the place's index.
     switched: &'a BTreeMap<usize, Vec<&'a Mutant>>,
 }
 
@@ -87,7 +87,7 @@ impl Text<'_> {
         self.within(0..self.source.len(), 0)
     }
 
-    /// Returns the text of a range, with the places from index `first` on behind switches.
+    /// Returns the text of a range. Places in it, from index `first` on, are rewritten as switches.
     fn within(&self, range: Range<usize>, first: usize) -> String {
         let mut out = String::new();
         let mut at = range.start;
@@ -103,8 +103,7 @@ impl Text<'_> {
         out + &self.source[at..range.end]
     }
 
-    /// Writes a place with each of its mutants on a line of its own, so that a compiler error can be assigned to its
-    /// mutant.
+    /// Writes a place with each mutant on its own line, so that a compiler error can be assigned to its mutant.
     fn place(&self, index: usize, place: &Place, mutants: &[&Mutant]) -> String {
         let inner = |range: &Range<usize>| self.within(range.clone(), index + 1);
         let raw = |range: &Range<usize>| &self.source[range.clone()];

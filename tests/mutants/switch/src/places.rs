@@ -11,7 +11,7 @@ use syn::{
 
 use crate::{Position, start};
 
-/// A place that a mutant may change; ranges are in bytes.
+/// A place that a mutant may change. Ranges are in bytes.
 pub(crate) struct Place {
     pub(crate) range: Range<usize>,
     /// Position of the place in cargo-mutants' list.
@@ -131,8 +131,8 @@ impl<'a> Visit<'a> for Found {
     }
 }
 
-/// Returns whether a condition binds a name, as `if let` does. Such a condition can't be combined with another
-/// operator.
+/// Returns whether a condition binds a name, as `if let` does. No operator other than `&&` can combine such a
+/// condition with another one.
 fn binds(expression: &Expr) -> bool {
     match expression {
         Expr::Let(_) => true,
