@@ -1,4 +1,4 @@
-//! The sheet of a figure, in pixels from its upper left corner.
+//! The drawing sheet of a figure. Positions are in pixels from the upper left corner.
 
 use std::cell::RefCell;
 
@@ -10,19 +10,19 @@ use super::colour::{BLACK, Colour, DIM, WHITE};
 use super::look::{Look, Marker};
 use super::polyline::{self, Px};
 
-/// Usual width and height of a sheet, pixels.
+/// Default width and height of a sheet, pixels.
 pub const SIZE_PX: [u32; 2] = [900, 560];
-/// Mean width of a letter of the usual fonts, plain and bold, as a share of their size; slightly overestimated.
+/// Mean letter width, plain and bold, as a share of the font size. Slightly overestimated for common fonts.
 const LETTER: [f64; 2] = [0.56, 0.65];
 
 /// Horizontal alignment of a text at its position.
 #[derive(Debug, Clone, Copy)]
 pub enum Side {
-    /// Begins there.
+    /// The text extends to the right of its position.
     Right,
-    /// Ends there.
+    /// The text extends to the left of its position.
     Left,
-    /// Centred there.
+    /// The text is centred on its position.
     Middle,
 }
 
@@ -31,23 +31,23 @@ pub enum Side {
 pub struct Letters {
     /// Height of the letters, pixels.
     pub size_px: f64,
-    /// Their colour.
+    /// Colour of the letters.
     pub colour: Colour,
-    /// Bold rather than plain.
+    /// Whether the letters are bold.
     pub bold: bool,
-    /// Rotated to run upwards instead of to the right.
+    /// Whether the text is rotated to run upwards.
     pub upright: bool,
 }
 
-/// Labels and axis names.
+/// Style of labels and axis names.
 pub const NORMAL: Letters = Letters { size_px: 13.0, colour: BLACK, bold: false, upright: false };
-/// Axis numbers and notes.
+/// Style of axis numbers and notes.
 pub const SMALL: Letters = Letters { size_px: 12.0, colour: DIM, bold: false, upright: false };
-/// Headings and results.
+/// Style of headings and results.
 pub const BOLD: Letters = Letters { bold: true, ..NORMAL };
 const TITLE: Letters = Letters { size_px: 18.0, bold: true, ..NORMAL };
 
-/// A sheet with the drawings so far; later ones cover earlier ones.
+/// A sheet and everything drawn so far. A later drawing covers an earlier one.
 pub struct Canvas(RefCell<Document>);
 
 /// Approximate width of a text, pixels.
@@ -67,7 +67,7 @@ fn fitting(text: &str, room_px: f64, letters: Letters) -> String {
     text.chars().take(usize::try_from(most).unwrap_or(0)).chain(['…']).collect()
 }
 
-/// Rounded to a tenth of a pixel, finer than visible.
+/// Formats pixels to a tenth, which is finer than the eye resolves.
 fn number(px: f64) -> String {
     let text = format!("{:.1}", px + 0.0);
     let text = text.strip_suffix(".0").unwrap_or(&text);
@@ -104,7 +104,7 @@ impl Canvas {
         canvas
     }
 
-    /// The sheet as SVG.
+    /// Returns the sheet as SVG.
     pub fn into_svg(self) -> String {
         format!("{}\n", self.0.into_inner())
     }
@@ -113,15 +113,15 @@ impl Canvas {
         self.0.borrow_mut().append(node);
     }
 
-    /// A line of text, vertically centred on its position.
+    /// Draws a line of text, vertically centred on its position.
     pub fn text(&self, [x, y]: Px, text: &str, side: Side, letters: Letters) {
         let anchor = match side {
             Side::Right => "start",
             Side::Left => "end",
             Side::Middle => "middle",
         };
-        // Not every viewer supports vertical centring. The middle of letters is about a third of their size above the
-        // baseline.
+        // Not every viewer supports vertical centring, so the baseline is moved instead. The middle of a letter is
+        // about a third of the font size above the baseline.
         let mut node = element::Text::new(text)
             .set("x", number(x))
             .set("y", number(y + 0.35 * letters.size_px))
@@ -137,7 +137,7 @@ impl Canvas {
         self.put(node);
     }
 
-    /// A line of text on a white background, for positions crossed by lines.
+    /// Draws a line of text on a white background, for places where lines cross the text.
     pub fn text_on_white(&self, place: Px, text: &str, side: Side, letters: Letters) {
         let width = width_px(text, letters);
         let left = match side {
@@ -150,7 +150,7 @@ impl Canvas {
         self.text(place, text, side, letters);
     }
 
-    /// A rectangle without an outline.
+    /// Draws a rectangle without an outline.
     pub fn area(&self, [left, top]: Px, [right, bottom]: Px, colour: Colour) {
         let node = element::Rectangle::new()
             .set("x", number(left))
@@ -161,7 +161,7 @@ impl Canvas {
         self.put(node);
     }
 
-    /// Round dots of one colour, as one element.
+    /// Draws round dots of one colour as a single SVG element.
     pub fn dots(&self, places: &[Px], across_px: f64, colour: Colour) {
         let dot = |[x, y]: &Px| format!("M{} {}h0", number(*x), number(*y));
         let node = element::Path::new()
@@ -173,7 +173,7 @@ impl Canvas {
         self.put(node);
     }
 
-    /// Rectangles of one colour, as one element: upper left corners with width and height.
+    /// Draws rectangles of one colour as a single SVG element. Each is an upper left corner with width and height.
     pub fn areas(&self, areas: &[(Px, Px)], colour: Colour) {
         let area = |([left, top], [width, height]): &(Px, Px)| {
             let [width, height] = [width, height].map(|px| number(*px));
@@ -182,12 +182,12 @@ impl Canvas {
         let node = element::Path::new()
             .set("d", areas.iter().map(area).collect::<String>())
             .set("fill", hex(colour))
-            // Anti-aliasing would show the sheet between neighbours.
+            // Anti-aliasing would show the sheet between adjacent rectangles.
             .set("shape-rendering", "crispEdges");
         self.put(node);
     }
 
-    /// A line with an arrowhead at either end.
+    /// Draws a line with an arrowhead at each end.
     pub fn span(&self, from: Px, to: Px, look: &Look) {
         self.line(&[from, to], look);
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
@@ -201,12 +201,12 @@ impl Canvas {
         }
     }
 
-    /// A filled polygon without an outline.
+    /// Draws a filled polygon without an outline.
     pub fn polygon(&self, corners: &[Px], colour: Colour) {
         self.put(element::Polygon::new().set("points", points(corners)).set("fill", hex(colour)));
     }
 
-    /// A line through these positions with the given look.
+    /// Draws a line through these positions with the given look.
     pub fn line(&self, places: &[Px], look: &Look) {
         let mut node = element::Polyline::new()
             .set("points", points(&polyline::thinned(places)))
@@ -220,7 +220,7 @@ impl Canvas {
         self.put(node);
     }
 
-    /// A marker, filled or with a white interior.
+    /// Draws a marker, filled or with a white interior.
     pub fn marker(&self, place: Px, look: &Look, size_px: f64, filled: bool) {
         let inside = if filled { look.colour } else { WHITE };
         let outline = Look { width_px: 1.4, dash: &[], ..*look };

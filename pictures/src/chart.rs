@@ -1,4 +1,4 @@
-//! A chart: a frame with two axes, and the mapping from metres to pixels.
+//! A chart: a frame with two axes, and the mapping from values to pixels.
 
 use headrace_geometry::math;
 
@@ -8,7 +8,7 @@ use super::look::{AXIS, GRID, Look};
 use super::polyline::Frame;
 use super::polyline::Px;
 
-/// Ratio of its ends below which a logarithmic axis has linear steps.
+/// Minimum ratio of end to start for logarithmic ticks. An axis with a smaller ratio gets linear ticks.
 const SHORT: f64 = 4.0;
 /// Length of a tick mark, pixels.
 const TICK_PX: f64 = 4.0;
@@ -38,16 +38,16 @@ impl Scale {
 #[must_use]
 pub struct Axis {
     scale: Scale,
-    /// Positions of ticks, with their numbers.
+    /// Value and text of each tick.
     ticks: Vec<(f64, String)>,
     name: String,
-    /// Distance of the axis's name from it, pixels.
+    /// Distance from the axis to its name, pixels.
     name_px: f64,
     numbered: bool,
 }
 
 impl Axis {
-    /// An axis with at most `most_ticks` ticks.
+    /// A linear axis with at most `most_ticks` steps between ticks.
     pub fn new(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
         let (ticks, digits) = ticks(from, to, most_ticks);
         let ticks = ticks.into_iter().map(|tick| (tick, format!("{tick:.digits$}"))).collect();
@@ -55,10 +55,9 @@ impl Axis {
         Self { scale, ticks, name: name.to_owned(), name_px: 36.0, numbered: true }
     }
 
-    /// A logarithmic axis, from above zero, with at most `most_ticks` ticks.
+    /// A logarithmic axis with at most `most_ticks` ticks; both ends must be above zero.
     ///
-    /// Ticks are powers of ten, with 2 and 5 between them if they fit. On an axis too short for these, the steps are
-    /// linear.
+    /// Ticks are powers of ten, with 2 and 5 (or 3) between them if they fit. A short axis gets linear ticks instead.
     pub fn logarithmic(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
         let scale = Scale { from, to, logarithmic: true };
         if to / from < SHORT {
@@ -68,18 +67,18 @@ impl Axis {
         Self { scale, ticks, name: name.to_owned(), name_px: 36.0, numbered: true }
     }
 
-    /// The axis with its name at a given distance, pixels.
+    /// Sets the distance from the axis to its name, pixels.
     pub fn with_name_at(self, name_px: f64) -> Self {
         Self { name_px, ..self }
     }
 
-    /// The axis without name and numbers, if the adjacent chart has them.
+    /// Removes name and numbers, for a chart whose neighbour shows them.
     pub fn bare(self) -> Self {
         Self { name: String::new(), numbered: false, ..self }
     }
 }
 
-/// Round numbers within a range, and the number of decimals that they need.
+/// Returns round numbers within a range, and the number of decimals that they need.
 fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
     const DECADES: [(f64, usize); 10] = [
         (1e-4, 4),
@@ -103,7 +102,7 @@ fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
     ((0..=most).map(tick).filter(|tick| *tick <= to + 1e-9 * step).collect(), digits)
 }
 
-/// Powers of ten within a range, with 2 and 5 between them if no more than `most` are found.
+/// Returns powers of ten within a range. Adds 2 and 5, or only 3, between them if the total is at most `most`.
 fn log_ticks(from: f64, to: f64, most: u32) -> Vec<f64> {
     let within = |factors: &[f64]| -> Vec<f64> {
         let decades =
@@ -124,7 +123,7 @@ fn ten_to(power: i32) -> f64 {
     (0..power).map(|_| 10.0).product()
 }
 
-/// The number of a tick of a logarithmic axis, as short as possible.
+/// Formats the number of a logarithmic tick as briefly as possible.
 fn tidy(tick: f64) -> String {
     if (1e-4..1e6).contains(&tick) {
         let text = format!("{tick:.4}");
@@ -134,7 +133,7 @@ fn tidy(tick: f64) -> String {
     }
 }
 
-/// A number with about three significant digits.
+/// Formats a number with about three significant digits.
 pub fn short(value: f64) -> String {
     match value.abs() {
         size if size < 0.0995 => format!("{value:.3}"),
@@ -144,11 +143,11 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// A chart on a canvas.
+/// A chart drawn on a canvas.
 pub struct Chart<'c> {
-    /// The canvas.
+    /// The canvas with the chart.
     pub canvas: &'c Canvas,
-    /// Position of the axes on the sheet.
+    /// Position of the plot area on the sheet.
     pub frame: Frame,
     x: Scale,
     y: Scale,
@@ -197,7 +196,7 @@ impl<'c> Chart<'c> {
         [left + self.x.share(x) * (right - left), bottom - self.y.share(y) * (bottom - top)]
     }
 
-    /// The line through these points, clipped to the frame; returns its pieces on the sheet.
+    /// Draws the line through these points, clipped to the frame. Returns the pieces of the line on the sheet.
     pub fn line(&self, points: &[[f64; 2]], look: &Look) -> Vec<Vec<Px>> {
         let places: Vec<Px> = points.iter().map(|point| self.px(*point)).collect();
         let pieces = self.frame.cut(&places);
@@ -207,19 +206,19 @@ impl<'c> Chart<'c> {
         pieces
     }
 
-    /// A horizontal line.
+    /// Draws a horizontal line.
     pub fn across(&self, y: f64, look: &Look) {
         self.line(&[[self.x.from, y], [self.x.to, y]], look);
     }
 
-    /// A vertical line.
+    /// Draws a vertical line.
     pub fn upright(&self, x: f64, look: &Look) {
         self.line(&[[x, self.y.from], [x, self.y.to]], look);
     }
 
-    /// An ellipse about a position on the sheet, clipped to the frame.
+    /// Draws an ellipse about a position on the sheet, clipped to the frame.
     pub fn ellipse(&self, centre: Px, radii: Px, ground: Colour, look: &Look) {
-        /// Corners of the approximating polygon.
+        /// Number of corners of the approximating polygon.
         const CORNERS: u32 = 72;
         let Frame { left, top, right, bottom } = self.frame;
         let corner = |k: u32| {
@@ -235,7 +234,7 @@ impl<'c> Chart<'c> {
         }
     }
 
-    /// Text in the middle of the frame, instead of a curve that can't be drawn.
+    /// Writes text in the middle of the frame, in place of a curve that can't be drawn.
     pub fn instead(&self, lines: &[String]) {
         let Frame { left, top, right, bottom } = self.frame;
         let first = f64::midpoint(top, bottom) - 10.0 * (lines.len() as f64 - 1.0);
@@ -251,7 +250,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_few() {
+    fn axis_ticks_are_round_numbers_within_the_range() {
         assert_eq!(ticks(0.0, 35.9, 10), (vec![0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0], 0));
         let (fine, digits) = ticks(0.0, 0.13, 7);
         assert_eq!((fine.len(), digits), (7, 2));
@@ -263,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithmic_ticks_are_round_and_few() {
+    fn logarithmic_ticks_are_round_numbers() {
         assert_eq!(log_ticks(0.01, 1.0, 8), [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0]);
         assert_eq!(log_ticks(1e-9, 1.0, 8), [1e-9, 1e-7, 1e-5, 1e-3, 0.1]);
         let words: Vec<String> = [1e-9, 1e-4, 0.05, 1.0, 2e6].map(tidy).into();
@@ -271,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_ratios_are_equally_long_on_a_logarithmic_axis() {
+    fn equal_ratios_have_equal_lengths_on_a_logarithmic_axis() {
         let scale = Scale { from: 1e-3, to: 1.0, logarithmic: true };
         for (value, share) in [(1e-3, 0.0), (1e-2, 1.0 / 3.0), (0.1, 2.0 / 3.0), (1.0, 1.0)] {
             assert!((scale.share(value) - share).abs() < 1e-12, "{value}");
@@ -279,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_three_figures() {
+    fn numbers_have_about_three_significant_digits() {
         for (value, text) in [(0.0641, "0.064"), (0.5, "0.50"), (16.94, "16.9"), (121.04, "121")] {
             assert_eq!(short(value), text);
         }

@@ -10,23 +10,24 @@ use super::look::AXIS;
 /// A position on the perimeter with its clock hour.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hour {
-    /// Arc length, m.
+    /// Arc length of the position, m.
     pub arc_m: f64,
-    /// The clock hour alone.
+    /// The clock hour, such as `7:30`.
     pub clock: String,
-    /// Name of the place; empty between floor, walls and crown.
+    /// Name of the place on the wall, such as `crown`; empty between the named places.
     pub place: &'static str,
 }
 
 impl Hour {
-    /// The clock hour and the name of the place.
+    /// Returns the clock hour, followed by the name of the place.
     pub fn words(&self) -> String {
         format!("{} {}", self.clock, self.place).trim_end().to_owned()
     }
 }
 
-/// The positions at every hour and a half from floor to floor, seen along the tunnel from the profile's reference
-/// point.
+/// Returns a position for every hour and a half, from floor to floor.
+///
+/// The clock is centred on the profile's reference point and read while looking along the tunnel.
 pub fn hours(profile: &Profile) -> Vec<Hour> {
     const NAMES: [(&str, &str); 9] = [
         ("6:00", "floor"),
@@ -43,7 +44,7 @@ pub fn hours(profile: &Profile) -> Vec<Hour> {
     let hour = |(k, (clock, place)): (u32, (&str, &'static str))| {
         let (sine, cosine) = math::sin_cos(math::TAU * f64::from(k) / 8.0);
         let arc_m = match k {
-            // The seam itself may be rounded to either side.
+            // The first and last positions are both at the seam, where rounding could put either at the wrong end.
             0 => 0.0,
             8 => profile.perimeter_m(),
             _ => profile.arc_of([y_m + sine, z_m - cosine]),
@@ -69,7 +70,7 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
 
     #[test]
-    fn hours_match_the_profile() {
+    fn clock_hours_match_those_of_the_profile() {
         for profile in
             [shapes::ceran().unwrap(), shapes::rectangle(3.0, 4.0).unwrap(), shapes::circle(0.5).unwrap()]
         {

@@ -15,11 +15,11 @@ const APART_PX: f64 = 12.0;
 pub struct Label {
     /// Position of the curve's end.
     pub place: Px,
-    /// Its text, line by line.
+    /// Text of the label, line by line.
     pub lines: Vec<String>,
-    /// Look of the curve, for the label's colour.
+    /// Look of the curve, which gives the label its colour.
     pub look: Look,
-    /// Bold rather than plain.
+    /// Whether the label is bold.
     pub bold: bool,
 }
 
@@ -34,7 +34,7 @@ impl Label {
     }
 }
 
-/// Draws labels to the right of a frame, each as near to its curve's end as its neighbours allow.
+/// Draws labels to the right of a frame, each as near to the end of its curve as the other labels allow.
 pub fn at_right(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     let mut labels: Vec<&Label> = labels.iter().collect();
     labels.sort_by(|a, b| a.place[1].total_cmp(&b.place[1]));
@@ -63,9 +63,9 @@ pub fn above(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     }
 }
 
-/// Moves intervals apart and returns their middles, as near to the wanted positions as their lengths allow.
+/// Moves overlapping intervals apart, as little as possible, and returns their middles.
 ///
-/// The order is kept, and the intervals lie within the bounds if they fit.
+/// The intervals keep their order, and lie within the bounds if they fit.
 fn moved_apart(wanted: &[(f64, f64)], from: f64, to: f64) -> Vec<f64> {
     let mut middles: Vec<f64> = Vec::with_capacity(wanted.len());
     let mut free = from;

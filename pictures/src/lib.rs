@@ -1,7 +1,7 @@
 //! Draws figures as SVG text: sheet, charts, looks of lines and markers, and labels.
 //!
-//! Figures are made for white paper: every line has its own dash pattern and label as well as its colour. The same
-//! input gives the same bytes.
+//! Figures are made for white paper: each line has its own dash pattern and label as well as its own colour. Equal
+//! input gives equal bytes.
 
 pub mod canvas;
 pub mod chart;

@@ -1,9 +1,9 @@
-//! Looks of lines and markers, never distinguished by colour alone.
+//! Looks of lines and markers. No two looks differ in colour alone.
 
 use super::colour::{BLACK, Colour, DIM, PALE};
 
-/// The palette of Okabe and Ito, which most colour-blind people can distinguish, without the colours too pale for
-/// lines.
+/// Colours of the Okabe and Ito palette, which most colour-blind people can distinguish. Those too pale for lines are
+/// left out.
 const BLUE: Colour = Colour(0, 114, 178);
 const VERMILION: Colour = Colour(213, 94, 0);
 const GREEN: Colour = Colour(0, 158, 115);
@@ -12,11 +12,11 @@ const PURPLE: Colour = Colour(170, 51, 119);
 /// Shape that marks a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Marker {
-    /// Drawn as a circle; has no corners.
+    /// A circle, which has no corners.
     Circle,
-    /// Sides vertical and horizontal.
+    /// A square with vertical and horizontal sides.
     Square,
-    /// Tip up.
+    /// A triangle with its tip up.
     Triangle,
     /// A square on its corner.
     Diamond,
@@ -25,7 +25,7 @@ pub enum Marker {
 }
 
 impl Marker {
-    /// Its corners, about a circle of radius 1.
+    /// Returns the corners, which lie close to a circle of radius 1.
     pub fn corners(self) -> &'static [[f64; 2]] {
         match self {
             Self::Circle => &[],
@@ -44,9 +44,9 @@ pub struct Look {
     pub colour: Colour,
     /// Width of the line, pixels.
     pub width_px: f64,
-    /// Lengths of dash, gap, dash, ..., pixels; empty for a solid line.
+    /// Lengths of dash and gap in turn, pixels; empty for a solid line.
     pub dash: &'static [f64],
-    /// Marker of its points.
+    /// Shape that marks points on the line.
     pub marker: Marker,
 }
 
@@ -54,7 +54,7 @@ const fn look(colour: Colour, dash: &'static [f64], marker: Marker) -> Look {
     Look { colour, width_px: 2.0, dash, marker }
 }
 
-/// Looks for series of several curves: modes, heads.
+/// Looks of the curves in a series, such as one curve per mode or per head.
 const SEVERAL: [Look; 8] = [
     look(BLUE, &[], Marker::Circle),
     look(VERMILION, &[9.0, 4.0], Marker::Square),
@@ -66,26 +66,26 @@ const SEVERAL: [Look; 8] = [
     look(GREEN, &[5.0, 7.0], Marker::Diamond),
 ];
 
-/// The look of curve number `number` among several.
+/// Returns the look of curve number `number` in a series.
 pub fn of_several(number: usize) -> Look {
     SEVERAL.get(number % SEVERAL.len()).copied().unwrap_or(T)
 }
 
-/// T, and curves that represent it.
+/// Look of T, and of curves that represent T.
 pub const T: Look = look(BLACK, &[], Marker::Circle);
-/// T_x: between passes.
+/// Look of T_x, the spacing between passes.
 pub const T_X: Look = look(BLUE, &[10.0, 4.0], Marker::Square);
-/// T_y: between neighbours of a turn.
+/// Look of T_y, the spacing between neighbouring returns of a turn.
 pub const T_Y: Look = look(VERMILION, &[3.0, 3.0], Marker::Triangle);
-/// The target.
+/// Look of the target.
 pub const TARGET: Look = Look { width_px: 1.6, ..look(DIM, &[6.0, 5.0], Marker::Circle) };
-/// The requested value.
+/// Look of the requested value.
 pub const ASKED: Look = Look { width_px: 1.4, ..look(DIM, &[2.0, 4.0], Marker::Circle) };
-/// Parts occluded by the vehicle.
+/// Look of parts that the vehicle occludes.
 pub const HIDDEN: Look = Look { width_px: 1.2, ..look(PALE, &[1.5, 3.5], Marker::Circle) };
-/// Grid lines.
+/// Look of grid lines.
 pub const GRID: Look = Look { width_px: 0.8, ..look(Colour(228, 228, 228), &[], Marker::Circle) };
-/// The axes.
+/// Look of axes.
 pub const AXIS: Look = Look { width_px: 1.0, ..look(DIM, &[], Marker::Circle) };
-/// A line from a label to its item.
+/// Look of the line that connects a label with its item.
 pub const LEADER: Look = Look { width_px: 0.8, ..look(PALE, &[], Marker::Circle) };

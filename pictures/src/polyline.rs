@@ -1,14 +1,14 @@
-//! Polylines: clipped to a frame, and simplified.
+//! Clips polylines to a frame, and simplifies them.
 
 use headrace_geometry::math;
 
-/// A position on the sheet: right and down, pixels.
+/// A position on the sheet, pixels: to the right, and down.
 pub type Px = [f64; 2];
 
-/// Greatest deviation of a simplified line, pixels.
+/// Maximum distance between a line and its simplified form, pixels.
 const THINNED_PX: f64 = 0.1;
 
-/// A rectangle on the sheet, pixels from its left and upper edges.
+/// A rectangle on the sheet, in pixels from the sheet's left and upper edges.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
     /// Left side.
@@ -22,7 +22,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The pieces of a line within the frame.
+    /// Returns the pieces of a line that lie within the frame.
     pub fn cut(&self, line: &[Px]) -> Vec<Vec<Px>> {
         let mut pieces: Vec<Vec<Px>> = Vec::new();
         for pair in line.windows(2) {
@@ -36,7 +36,7 @@ impl Frame {
         pieces
     }
 
-    /// The part of a segment within the frame. Source: Liang and Barsky 1984.
+    /// Returns the part of a segment within the frame. Source: Liang and Barsky 1984.
     fn cut_segment(&self, from: Px, to: Px) -> Option<[Px; 2]> {
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
         let (mut first, mut last) = (0.0_f64, 1.0_f64);
@@ -56,7 +56,7 @@ impl Frame {
             }
         }
         let along = |share: f64| [from[0] + share * dx, from[1] + share * dy];
-        // An unclipped end is kept to the bit, so that pieces can be joined.
+        // An unclipped end stays identical to the bit, so that adjacent pieces can be joined.
         let begin = if first > 0.0 { along(first) } else { from };
         let end = if last < 1.0 { along(last) } else { to };
         (first <= last).then_some([begin, end])
@@ -68,9 +68,9 @@ impl Frame {
     }
 }
 
-/// A step across a wall unrolled at its seam, from (x, arc length) to (x, arc length), m.
+/// Returns a step on an unrolled wall as line segments. Positions are (x, arc length), m.
 ///
-/// It is one segment or, if the path over the seam is shorter, two segments that meet at the seam.
+/// The step is one segment or, if the shorter path crosses the seam, two segments that end at the seam.
 pub fn over_seam(perimeter_m: f64, from: [f64; 2], to: [f64; 2]) -> Vec<[[f64; 2]; 2]> {
     let around_m = math::wrap_signed(to[1] - from[1], perimeter_m);
     if (to[1] - from[1] - around_m).abs() < 1e-9 {
@@ -82,7 +82,7 @@ pub fn over_seam(perimeter_m: f64, from: [f64; 2], to: [f64; 2]) -> Vec<[[f64; 2
     vec![[from, [x_m, leaving_m]], [[x_m, entering_m], to]]
 }
 
-/// Simplified line. Source: Douglas and Peucker 1973.
+/// Returns a simplified line. Source: Douglas and Peucker 1973.
 pub fn thinned(line: &[Px]) -> Vec<Px> {
     let mut keep = vec![false; line.len()];
     if let Some(end) = keep.first_mut() {
@@ -103,7 +103,7 @@ pub fn thinned(line: &[Px]) -> Vec<Px> {
     line.iter().zip(keep).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
 }
 
-/// The point between two others that is farthest from their chord, if beyond the tolerance.
+/// Returns the point between `first` and `last` that is farthest from their chord, if beyond the tolerance.
 fn farthest(line: &[Px], first: usize, last: usize) -> Option<usize> {
     let (from, to) = (*line.get(first)?, *line.get(last)?);
     let between = line.iter().enumerate().take(last).skip(first + 1);
@@ -128,7 +128,7 @@ mod tests {
     const UNIT: Frame = Frame { left: 0.0, top: 0.0, right: 1.0, bottom: 1.0 };
 
     #[test]
-    fn a_line_is_cut_off_at_the_frame() {
+    fn line_is_clipped_at_the_frame() {
         let over = [[-1.0, 0.5], [0.5, 0.5], [0.5, 3.0], [0.75, 3.0], [0.75, 0.5]];
         let pieces = UNIT.cut(&over);
         assert_eq!(pieces, [vec![[0.0, 0.5], [0.5, 0.5], [0.5, 1.0]], vec![[0.75, 1.0], [0.75, 0.5]]]);
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn thinning_keeps_corners_and_drops_points_between() {
+    fn simplified_line_keeps_corners_and_drops_points_between_them() {
         let line: Vec<Px> = (0..=100).map(|k| [f64::from(k), f64::from((k - 50_i32).abs())]).collect();
         assert_eq!(thinned(&line), [[0.0, 50.0], [50.0, 0.0], [100.0, 50.0]]);
         assert!(thinned(&[]).is_empty());

@@ -1,6 +1,6 @@
 //! Checks whether a text is well-formed XML, for tests of figures.
 
-/// Checks that tags are closed in order, attributes quoted, and everything else escaped.
+/// Checks that tags are closed in order, attributes are quoted and special characters are escaped.
 ///
 /// Errors: the first fault, as text.
 pub fn well_formed(svg: &str) -> Result<(), String> {
@@ -50,7 +50,7 @@ mod tests {
     use super::well_formed;
 
     #[test]
-    fn xml_check_finds_faults() {
+    fn malformed_xml_is_refused() {
         well_formed("<a b=\"c\"><d/>x &amp; y</a>\n").unwrap();
         for wrong in ["<a>", "<a></b>", "<a b=c/>", "<a b=\"c/>", "<a>&</a>", "<a>&nbsp;</a>", "</a>", "text"]
         {

@@ -32,9 +32,7 @@ impl Loss {
 
     /// Messages that are out of order by more than a reader can hold.
     pub(crate) fn of_order(late: u64) -> Self {
-        let what = format!(
-            "{late} messages out of order by more than the reordering buffer holds, delivered in file order"
-        );
+        let what = format!("{late} messages too far out of order to be sorted, delivered in file order");
         Self { what, offset: 0, bytes: 0, from_ns: None, to_ns: None }
     }
 }

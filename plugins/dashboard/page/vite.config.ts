@@ -5,7 +5,7 @@ const program = process.env["HEADRACE"] ?? "http://127.0.0.1:8881";
 const to = { target: program, changeOrigin: true, ws: true, headers: { origin: program } };
 const proxy = { "/feed": to, "/samples": to, "/state.json": to, "/login": to, "/voice": to };
 
-// Two files with fixed names beside index.html, so that the program always embeds the same list.
+// Two files with fixed names beside index.html, so that the program always embeds the same list of files.
 export default defineConfig({
   base: "/",
   server: { proxy },

@@ -1,4 +1,4 @@
-//! Access rights by tokens, hosts and origins.
+//! Decides who may access the page, by tokens, hosts and origins.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -6,21 +6,21 @@ use std::net::IpAddr;
 
 use axum::http::{HeaderMap, Uri, header};
 
-/// Name of the cookie.
+/// Name of the cookie that holds the token.
 pub(crate) const COOKIE: &str = "headrace_token";
-/// Bytes of entropy of a token.
+/// Entropy of a random token, bytes.
 const TOKEN_BYTES: usize = 16;
 
-/// Rights of a viewer.
+/// Role of a viewer, which decides what the viewer may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// May watch.
+    /// May only watch.
     Viewer,
     /// May watch, acknowledge, take notes, and control a replay.
     Operator,
 }
 
-/// A secret. `Debug` doesn't show it.
+/// A secret token. `Debug` output hides its text.
 #[derive(Clone)]
 pub struct Token(String);
 
@@ -40,9 +40,9 @@ impl Token {
         Ok(Self(format!("{:032x}", u128::from_be_bytes(bytes))))
     }
 
-    /// Accepts a chosen token: 16 to 128 letters, digits, `-` and `_`.
+    /// Accepts a token chosen by the user: 16 to 128 letters, digits, `-` and `_`.
     ///
-    /// Errors: the fault, without the token's text.
+    /// Errors: the reason, without the token's text.
     pub fn chosen(text: &str) -> Result<Self, String> {
         let is_fit = |byte: u8| byte.is_ascii_alphanumeric() || b"-_".contains(&byte);
         if !(16..=128).contains(&text.len()) {
@@ -51,16 +51,16 @@ impl Token {
         if text.bytes().all(is_fit) {
             Ok(Self(text.to_owned()))
         } else {
-            Err("has others than letters, digits, - and _".to_owned())
+            Err("has characters other than letters, digits, - and _".to_owned())
         }
     }
 
-    /// Its text, for the person who starts the program.
+    /// Text of the token, to show to the person who starts the program.
     pub fn text(&self) -> &str {
         &self.0
     }
 
-    /// Compares in constant time.
+    /// Compares the token with a text in constant time.
     fn is(&self, other: &str) -> bool {
         let (own, other) = (self.0.as_bytes(), other.as_bytes());
         let differs =
@@ -72,35 +72,35 @@ impl Token {
 /// Tokens of viewers and operators.
 #[derive(Debug, Clone)]
 pub struct Tokens {
-    /// Token of viewers.
+    /// Token that gives the role of a viewer.
     pub viewer: Token,
-    /// Token of operators.
+    /// Token that gives the role of an operator.
     pub operator: Token,
 }
 
-/// Rules of access.
+/// Access rules of the page.
 #[derive(Debug, Clone)]
 pub(crate) struct Access {
-    /// Tokens; `None` on loopback, where every local user may act.
+    /// Tokens; `None` on loopback, where every local user may operate.
     pub(crate) tokens: Option<Tokens>,
-    /// Names of this machine besides addresses and `localhost`.
+    /// Names of this machine, in addition to its addresses and `localhost`.
     pub(crate) hosts: Vec<String>,
-    /// Origins (`http://host`) of other pages that may frame this one and send actions.
+    /// Origins (`http://host`) of other pages that may frame this page and send actions.
     pub(crate) origins: Vec<String>,
-    /// Whether only `localhost` and loopback addresses count as this machine.
+    /// Whether this machine accepts only requests to `localhost` and loopback addresses.
     pub(crate) is_loopback: bool,
 }
 
 impl Access {
-    /// Role of a token.
+    /// Returns the role of a token; `None` for a wrong token.
     pub(crate) fn role_of(&self, token: &str) -> Option<Role> {
         let tokens = self.tokens.as_ref()?;
-        // Both are always compared, so that the time doesn't show which one matched.
+        // The token is always compared with both, so that response time does not reveal a match.
         let (operates, sees) = (tokens.operator.is(token), tokens.viewer.is(token));
         if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
     }
 
-    /// Whether this is the token of a role. Other roles' tokens aren't compared.
+    /// Whether a token belongs to a role. Tokens of other roles aren't compared.
     pub(crate) fn is_token_of(&self, role: Role, token: &str) -> bool {
         self.tokens.as_ref().is_some_and(|tokens| match role {
             Role::Viewer => tokens.viewer.is(token),
@@ -108,7 +108,7 @@ impl Access {
         })
     }
 
-    /// Whether the request names this machine. Another name that resolves to it is DNS rebinding.
+    /// Whether the request addresses this machine by an address or a known name. This prevents DNS rebinding.
     pub(crate) fn is_host(&self, headers: &HeaderMap) -> bool {
         let Some(host) = headers.get(header::HOST).and_then(|value| value.to_str().ok()) else {
             return false;
@@ -121,7 +121,7 @@ impl Access {
             || self.hosts.iter().any(|known| known.eq_ignore_ascii_case(name))
     }
 
-    /// Whether a request comes from this page, from a declared origin, or from no page.
+    /// Whether a request comes from this page, from a declared origin, or from a client that isn't a page.
     pub(crate) fn is_origin(&self, headers: &HeaderMap) -> bool {
         let Some(origin) = headers.get(header::ORIGIN) else { return true };
         let (Ok(origin), Some(Ok(host))) =
@@ -134,7 +134,7 @@ impl Access {
     }
 }
 
-/// All distinct tokens of a request: from cookies, `Authorization: Bearer`, and the query.
+/// Returns all distinct tokens of a request: from cookies, `Authorization: Bearer`, and the query.
 pub(crate) fn tokens_of(headers: &HeaderMap, uri: &Uri) -> BTreeSet<String> {
     let values = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
     let cookies = values(header::COOKIE).flat_map(|line| line.split(';'));
@@ -144,7 +144,7 @@ pub(crate) fn tokens_of(headers: &HeaderMap, uri: &Uri) -> BTreeSet<String> {
     all.chain(query(uri, "token")).collect()
 }
 
-/// A host without its port.
+/// Returns a host without its port.
 pub(crate) fn name_of(host: &str) -> &str {
     match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) && !name.is_empty() => name,
@@ -152,7 +152,7 @@ pub(crate) fn name_of(host: &str) -> &str {
     }
 }
 
-/// A decoded value of the query.
+/// Returns the decoded value of a key in the query.
 pub(crate) fn query(uri: &Uri, key: &str) -> Option<String> {
     let pairs = uri.query()?.split('&').filter_map(|pair| pair.split_once('='));
     pairs.into_iter().find(|(name, _)| *name == key).map(|(_, value)| unescaped(value))
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn tokens_come_from_cookies_bearer_and_query_each_once() {
+    fn distinct_tokens_are_read_from_cookies_bearer_and_query() {
         let tokens = |pairs: &[(header::HeaderName, &str)], uri: &'static str| {
             let headers = pairs.iter().map(|(name, value)| (name, HeaderValue::from_str(value).unwrap()));
             let mut map = HeaderMap::new();
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn role_is_that_of_the_token() {
+    fn token_decides_the_role() {
         let access = access(false);
         assert_eq!(access.role_of("viewer-0123456789"), Some(Role::Viewer));
         assert_eq!(access.role_of("operator-01234567"), Some(Role::Operator));
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn other_host_names_are_refused() {
+    fn unknown_host_names_are_refused() {
         let is_host = |is_loopback, host| access(is_loopback).is_host(&headers(&[(header::HOST, host)]));
         for host in ["localhost:8881", "127.0.0.1:8881", "[::1]:8881", "rov.local"] {
             assert!(is_host(true, host) && is_host(false, host), "{host}");
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn other_pages_are_refused_except_declared_ones() {
+    fn undeclared_origins_are_refused() {
         let is_origin = |origin| {
             access(false).is_origin(&headers(&[(header::HOST, "127.0.0.1:8881"), (header::ORIGIN, origin)]))
         };
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn tokens_are_long_random_and_never_shown() {
+    fn random_tokens_differ_and_debug_output_hides_them() {
         let (one, other) = (Token::random().unwrap(), Token::random().unwrap());
         assert!(one.text() != other.text() && one.text().len() == 32);
         assert_eq!(format!("{one:?}"), "Token(..)");

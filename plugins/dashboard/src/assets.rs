@@ -1,24 +1,24 @@
-//! The built page: `plugins/dashboard/page/dist`, listed by `build.rs` and embedded in the binary.
+//! Files of the built page, `plugins/dashboard/page/dist`. `build.rs` lists them, and the binary embeds them.
 
 include!(concat!(env!("OUT_DIR"), "/assets.rs"));
 
-/// A file of the page by its path below `dist`.
+/// Returns a file of the page by its path below `dist`.
 pub(crate) fn asset(path: &str) -> Option<&'static [u8]> {
     ASSETS.iter().find(|(name, _)| *name == path).map(|(_, bytes)| *bytes)
 }
 
-/// The page itself.
+/// Returns the page, `index.html`.
 pub fn index() -> &'static [u8] {
     asset("index.html")
         .unwrap_or(b"<!doctype html><title>headrace</title><p>This program was built without its page.")
 }
 
-/// The page as one file with its scripts and styles inline; `None` if the program was built without it.
+/// Returns the page as one file with inline scripts and styles; `None` if the program was built without the page.
 pub fn single() -> Option<&'static str> {
     core::str::from_utf8(asset("single.html")?).ok()
 }
 
-/// Content type of a file by its name.
+/// Returns the content type for a file name.
 pub(crate) fn content_type(path: &str) -> &'static str {
     match path.rsplit_once('.').map_or("", |(_, extension)| extension) {
         "html" => "text/html; charset=utf-8",

@@ -1,8 +1,8 @@
-//! Collects the page's data on the loop's thread, and hands it over without waiting.
+//! Collects the page's data on the loop's thread, and passes it to the page's thread without waiting.
 //!
-//! Data without room in the queue stays here and goes with the next message: section numbers, the newest state, and a
-//! bounded number of samples and lines. Further samples are counted. Wall samples among them are read again from the
-//! loop's own store, if it has them.
+//! While the queue is full, data stays in the collector and is sent with the next message. The collector keeps all
+//! section numbers, the latest state, and a limited number of samples and events. Data beyond these limits is dropped
+//! and counted. Dropped wall samples are read again from the loop's own store if it has them.
 
 use std::collections::BTreeSet;
 
@@ -25,19 +25,19 @@ use crate::compared::Compared;
 use crate::fed::{Beside, Dropped, EchoJson, Fed, News, PlaybackState, PoseJson, RateJson, RecordingJson};
 use crate::wire::{NONE, Outcome, SampleRecord, SectionRecord};
 
-/// Number of messages that may wait for the page's thread.
+/// Capacity of the queue to the page's thread, messages.
 pub(crate) const WAITING: usize = 64;
-/// Samples held here while there is no room: ten seconds of four heads.
+/// Maximum number of samples kept while the queue is full: ten seconds of four heads.
 const MOST_SAMPLES: usize = 20_000;
-/// Lines held here.
+/// Maximum number of events kept while the queue is full.
 const MOST_TOLD: usize = 256;
-/// Largest number of sections in one message.
+/// Maximum number of sections in one message.
 const SECTIONS_AT_ONCE: usize = 4096;
-/// Interval of states without an update, and of rates.
+/// Maximum interval between states, for times without an update.
 const EVERY: DurNs = DurNs(200_000_000);
-/// Averaging time of rates.
+/// Averaging window for the rates of sensors.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
-/// Interval of the list of stretches to go back for.
+/// Minimum interval between lists of stretches to go back for.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
 
 /// The last ping of an echosounder.
@@ -47,25 +47,25 @@ struct Ping {
     range_m: Option<f64>,
 }
 
-/// State of a sensor for its rate.
+/// A sensor, with the data that its rate and its display need.
 #[derive(Debug)]
 struct Followed {
     id: String,
     mount: Mount,
     is_echosounder: bool,
-    /// Its number among the heads.
+    /// Number of this sensor among the heads.
     head: u8,
     ping: Option<Ping>,
     hz: f64,
-    /// Number of readings at the start of the present interval.
+    /// Number of readings at the start of the averaging window.
     readings: u64,
 }
 
-/// Collects the page's data. It must be called after every tick, with a loop that keeps its results.
+/// Collects the page's data. The loop must keep its results, and the collector must be called after every tick.
 #[expect(clippy::struct_excessive_bools, reason = "independent flags for what is due")]
 pub struct Collector {
     to: Sender<Fed>,
-    /// Whether it waits for the page: a replay does, a live dive doesn't.
+    /// Whether the collector waits for room in the queue. A replay waits, a live dive does not.
     waits: bool,
     is_playback: bool,
     teller: LiveMessages,
@@ -73,12 +73,12 @@ pub struct Collector {
     rates_from: Option<MonoNs>,
     begun: Option<MonoNs>,
     sent: Option<MonoNs>,
-    /// Last tick that was played rather than skipped by a seek.
+    /// Time of the last tick that was played. Ticks that a seek skips don't count.
     played: Option<MonoNs>,
     changed: BTreeSet<i64>,
     samples: Vec<SampleRecord>,
     told: Vec<Value>,
-    /// Chainages of dropped samples, m.
+    /// Range of chainage of the dropped samples, m.
     lacking_m: Option<[f64; 2]>,
     dropped: Dropped,
     skips: bool,
@@ -91,7 +91,7 @@ pub struct Collector {
 }
 
 impl Collector {
-    /// Creates a collector for a loop; `waits` is for a replay.
+    /// Creates a collector for a loop; `waits` is true for a replay.
     pub(crate) fn new(
         to: Sender<Fed>,
         dive: &Loop,
@@ -139,12 +139,12 @@ impl Collector {
         }
     }
 
-    /// Also judges all sections by another target, m.
+    /// Also judges all sections for a second target, m.
     pub(crate) fn compared_with(self, target_m: Option<f64>) -> Self {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
-    /// Collects a result of the last tick.
+    /// Collects one notice of the last tick.
     pub fn notice(&mut self, notice: &Notice, dive: &Loop) {
         match notice {
             Notice::Section { section, .. } => {
@@ -168,7 +168,7 @@ impl Collector {
         let now = dive.now();
         self.played = Some(now);
         let is_due = self.sent.is_none_or(|sent| now.since(sent).0.abs() >= EVERY.0);
-        // Playback needs the data of each tick to seek back to it.
+        // Playback needs each tick's samples in a message of their own, so that it can seek back to any tick.
         if is_due
             || !self.told.is_empty()
             || !self.changed.is_empty()
@@ -198,7 +198,7 @@ impl Collector {
         self.push_told(json!({"type": "recording", "t_s": at.as_secs_f64(), "fails": fails, "text": text}));
     }
 
-    /// Collects the displayed text on the recordings, and whether it is an alarm; `None` while all is well.
+    /// Sets the displayed text about the recordings, and whether it is an alarm; `None` if recording works.
     pub fn recorded(&mut self, shown: Option<(String, bool)>) {
         let (words, fails) = shown.unzip();
         (self.recording.words, self.recording.fails) = (words, fails.unwrap_or_default());
@@ -210,7 +210,7 @@ impl Collector {
         self.hand(Fed::Playback(state));
     }
 
-    /// Handles a seek or pause of playback, after which the loop's state may differ.
+    /// Handles a seek or pause of playback, which may have changed the loop's state.
     pub fn stopped(&mut self, dive: &Loop) {
         if self.played == Some(dive.now()) {
             self.send(dive);
@@ -232,7 +232,7 @@ impl Collector {
         self.send(dive);
     }
 
-    /// Sends the end of the dive, once everything is judged.
+    /// Sends the end of the dive. Call it when all sections are judged.
     pub fn end(&mut self, dive: &Loop) {
         let mut told = Vec::new();
         self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
@@ -243,12 +243,12 @@ impl Collector {
         }
         self.back_due = true;
         self.back_told = None;
-        // At its end a live dive has time to wait, too.
+        // At the end, a live dive also has time to wait for room in the queue.
         self.waits = true;
         while !self.changed.is_empty() && self.send(dive) {}
     }
 
-    /// Marks all sections of the dive as changed, so that sections without a notice are sent, too.
+    /// Marks all sections of the dive as changed, because some change without a notice.
     fn change_all(&mut self, dive: &Loop) {
         let (sections, way) = (&dive.coverage().sections, dive.coverage().frontier.way());
         self.changed.extend(sections.sections_of(way));
@@ -267,7 +267,7 @@ impl Collector {
         self.aims_of(dive);
     }
 
-    /// Collects samples and doubtful returns of the last tick.
+    /// Collects the samples and doubtful returns of the last tick.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn samples_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();
@@ -288,7 +288,7 @@ impl Collector {
         }
     }
 
-    /// Collects the aims of pings without a return.
+    /// Collects the aims of pings that had no return.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn aims_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();
@@ -314,7 +314,7 @@ impl Collector {
         u32::try_from(since).unwrap_or(u32::MAX)
     }
 
-    /// Number of the head with this source.
+    /// Returns the head number of a source.
     fn head(&self, source: u64) -> u8 {
         let sensor = usize::try_from(source).ok().and_then(|source| self.sensors.get(source));
         sensor.map_or(NONE, |sensor| sensor.head)
@@ -352,7 +352,7 @@ impl Collector {
         }
     }
 
-    /// Sends collected data; `false` without room or without a receiver.
+    /// Sends the collected data. Returns `false` if the queue is full or the page has ended.
     fn send(&mut self, dive: &Loop) -> bool {
         if self.to.is_closed() || !self.waits && self.to.capacity() == 0 {
             return false;
@@ -391,17 +391,18 @@ impl Collector {
         true
     }
 
-    /// Hands a message over: a replay waits for room, a live dive sends only if there is room.
+    /// Passes a message to the queue. A replay waits for room; in a live dive a full queue drops the message.
     fn hand(&self, message: Fed) {
         if self.waits {
-            // There is no receiver once the page has ended.
+            // Sending fails once the page has ended, which needs no action.
             let _gone = self.to.blocking_send(message);
         } else if let Err(TrySendError::Full(_)) = self.to.try_send(message) {
             tracing::debug!("the page is behind");
         }
     }
 
-    /// Reads wall samples from the loop's store in place of dropped ones; the store has neither times nor heads.
+    /// Reads wall samples from the loop's store to replace dropped ones. The store has neither times nor head
+    /// numbers.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn mended(&mut self, dive: &Loop) -> Vec<SampleRecord> {
         let Some([from_m, to_m]) = self.lacking_m.take() else { return Vec::new() };
@@ -479,7 +480,7 @@ impl Collector {
         }
     }
 
-    /// Stretches to go back for, from the far end to the portal, if they have changed and are due.
+    /// Returns the stretches to go back for, from the far end to the portal, if the list has changed and is due.
     fn back(&mut self, dive: &Loop) -> Option<Value> {
         let now = dive.now();
         let waits =

@@ -1,17 +1,17 @@
-//! Messages from viewers.
+//! Parses messages from viewers.
 
 use serde::{Deserialize, Serialize};
 
-/// Longest message from a viewer, bytes.
+/// Maximum length of a viewer's message, bytes.
 pub(crate) const LONGEST: usize = 4096;
-/// Longest text of a note, bytes.
+/// Maximum length of a note, bytes.
 const LONGEST_NOTE: usize = 240;
-/// Longest name of a sender, bytes.
+/// Maximum length of a sender's name, bytes.
 const LONGEST_NAME: usize = 16;
-/// Allowed rates of states, Hz.
+/// Rates at which a viewer may request states, Hz.
 const RATES_HZ: core::ops::RangeInclusive<f64> = 0.1..=5.0;
 
-/// A request as received.
+/// A viewer's request, parsed but not yet validated.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Request {
@@ -21,18 +21,18 @@ pub(crate) enum Request {
         #[serde(default)]
         by: String,
     },
-    /// Silences alerts that sound.
+    /// Silences all alerts that sound.
     Silence {
         #[serde(default)]
         by: String,
     },
-    /// Notes a text at the present position.
+    /// Adds a text note at the present position.
     Note {
         text: String,
         #[serde(default)]
         by: String,
     },
-    /// Marks the present position.
+    /// Adds a mark at the present position.
     Mark {
         #[serde(default)]
         by: String,
@@ -43,7 +43,7 @@ pub(crate) enum Request {
         #[serde(default)]
         by: String,
     },
-    /// Controls a replay.
+    /// Controls the playback of a replay.
     Play {
         command: String,
         #[serde(default)]
@@ -51,43 +51,43 @@ pub(crate) enum Request {
         #[serde(default)]
         to_s: Option<f64>,
     },
-    /// Requests a rate of states.
+    /// Sets the rate at which this viewer gets states.
     Rate { hz: f64 },
 }
 
-/// An operator's action, serialised as operator input of the loop.
+/// An operator's action, which is serialised as operator input of the loop.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "do", rename_all = "snake_case")]
 pub enum Command {
-    /// Acknowledges an alert; 0 acknowledges all that require it.
+    /// Acknowledges an alert; 0 acknowledges all alerts that need an acknowledgement.
     Acknowledge {
         /// Number of the alert.
         alert: u32,
-        /// Sender, at most 16 bytes.
+        /// Name of the sender, at most 16 bytes.
         by: String,
     },
-    /// Silences all alerts that sound, for a while.
+    /// Silences all alerts that sound, for a limited time.
     Silence {
-        /// Sender.
+        /// Name of the sender.
         by: String,
     },
-    /// Notes a text at the present position.
+    /// Adds a text note at the present position.
     Note {
-        /// At most 240 bytes.
+        /// Text of the note, at most 240 bytes.
         text: String,
-        /// Sender.
+        /// Name of the sender.
         by: String,
     },
-    /// Marks the present position.
+    /// Adds a mark at the present position.
     Mark {
-        /// Sender.
+        /// Name of the sender.
         by: String,
     },
-    /// Begins a voice note at the present position; its recording follows by `/voice/ID`.
+    /// Begins a voice note at the present position. The recording follows as a request to `/voice/ID`.
     Voice {
-        /// Id that links it to its recording; chosen by the page, not 0.
+        /// Id that links the note to its recording; chosen by the page, not 0.
         id: u32,
-        /// Sender.
+        /// Name of the sender.
         by: String,
     },
 }
@@ -105,38 +105,38 @@ impl Command {
     }
 }
 
-/// A command of playback.
+/// A command to playback.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Play {
-    /// Pause.
+    /// Pauses playback.
     Pause,
-    /// Resume.
+    /// Resumes playback.
     Go,
-    /// Play one tick, then pause.
+    /// Plays one tick, then pauses.
     Step,
-    /// Play until a section is judged, then pause.
+    /// Plays until a section is judged, then pauses.
     StepSection,
-    /// End.
+    /// Ends playback.
     End,
-    /// Speed as a multiple of real time; `None` is as fast as possible.
+    /// Sets the speed as a multiple of real time; `None` plays as fast as possible.
     Speed(Option<f64>),
-    /// Seek to this time, seconds on the log's clock.
+    /// Seeks to this time, seconds on the log's clock.
     Seek(f64),
 }
 
-/// A valid request.
+/// A validated request.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Asked {
     Command(Command),
     Play(Play),
-    /// Rate of states, Hz.
+    /// Rate at which this viewer gets states, Hz.
     Rate(f64),
 }
 
 impl Asked {
-    /// Parses the text of a message.
+    /// Parses and validates the text of a message.
     ///
-    /// Errors: the reason why it is invalid.
+    /// Errors: the reason why the message is invalid.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let request: Request =
             serde_json::from_str(text).map_err(|error| format!("no valid command: {error}"))?;
@@ -193,9 +193,11 @@ fn play(command: &str, speed: Option<f64>, to_s: Option<f64>) -> Result<Play, St
     })
 }
 
-/// Parses a viewer's message into an operator's command; `None` for requests that concern a replay or the page alone.
+/// Parses a viewer's message into an operator's command.
 ///
-/// Errors: the reason why it is invalid, as in the page's refusal.
+/// Returns `None` for requests that concern only a replay or the page.
+///
+/// Errors: the reason why the message is invalid, as the page states it in a refusal.
 pub fn command_of(message: &str) -> Result<Option<Command>, String> {
     Ok(match Asked::parse(message)? {
         Asked::Command(command) => Some(command),
@@ -208,7 +210,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn commands_are_accepted_or_refused_with_the_reason() {
+    fn valid_commands_are_parsed_and_others_refused_with_the_reason() {
         let command = |text| Asked::parse(text);
         assert_eq!(
             command(r#"{"do":"acknowledge","alert":12,"by":"AB"}"#),

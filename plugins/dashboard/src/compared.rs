@@ -7,21 +7,22 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::run::Loop;
 use serde::Serialize;
 
-/// Interval of comparing all sections. Sections also change without a notice, when the vehicle passes them.
+/// Interval between comparisons of all sections. A comparison is periodic because sections change without a notice
+/// while the vehicle passes them.
 const EVERY: DurNs = DurNs(1_000_000_000);
 
-/// Lengths by verdict for the second target, of sections with a measured hole.
+/// Lengths by verdict for the second target. Only sections with a measured hole count.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct ComparedJson {
     /// Second target, m.
     pub target_m: f64,
-    /// Length that passes, m.
+    /// Length with the verdict "pass", m.
     pub pass_m: f64,
-    /// Length that fails, m.
+    /// Length with the verdict "fail", m.
     pub fail_m: f64,
-    /// Length with the verdict can't say, m.
+    /// Length with the verdict "can't say", m.
     pub cannot_say_m: f64,
-    /// Open length, m.
+    /// Length with the verdict "open", m.
     pub open_m: f64,
 }
 
@@ -40,7 +41,7 @@ impl Compared {
         Self { target_m, verdicts: BTreeMap::new(), at: None, json }
     }
 
-    /// Compares if due, and calls `changed` with each section whose verdict changed.
+    /// Compares all sections if a comparison is due. Calls `changed` with each section whose verdict has changed.
     pub(crate) fn refresh(&mut self, dive: &Loop, changed: impl FnMut(i64)) {
         let now = dive.now();
         if self.at.is_some_and(|at| (0..EVERY.0).contains(&now.since(at).0)) {
@@ -62,7 +63,7 @@ impl Compared {
         self.verdicts = verdicts;
     }
 
-    /// Forces a comparison at the next call, because the loop's state may have changed.
+    /// Makes the next call of `refresh` compare, because the loop's state may have changed.
     pub(crate) fn forget(&mut self) {
         self.at = None;
         self.verdicts.clear();

@@ -1,4 +1,4 @@
-//! Exports a dive as one file: the page with all data that a server would send.
+//! Exports a dive as one file: the page together with all data that a server would send.
 
 use std::io::{self, Write as _};
 use std::thread::JoinHandle;
@@ -20,24 +20,25 @@ use crate::model::Model;
 use crate::site::{May, Site};
 use crate::wire::sample_frame;
 
-/// Largest number of samples in a file; beyond it samples are thinned.
+/// Maximum number of samples in a file. A dive with more samples is thinned.
 const MOST_SAMPLES: usize = 500_000;
-/// Largest number of states in a file: one a second for two hours. Longer dives keep every second state, and so on.
+/// Maximum number of states in a file: one per second for two hours. Longer dives keep every second state, every
+/// fourth, and so on.
 const MOST_STATES: usize = 7200;
-/// Marks a page that contains a dive, after its first line.
+/// Attribute that marks the embedded dive in an exported page.
 pub const MARK: &str = "id=\"dive\"";
-/// Parts of a state that a file omits, because they are there once or have no meaning.
+/// Fields of a state that a file omits, because the file stores them only once or they have no meaning there.
 const LEFT_OUT: [&str; 9] =
     ["type", "seq", "alert_list", "alerts", "playback", "ended", "page_dropped", "rates", "recording"];
 
-/// Reason why there is no file.
+/// Reason why a dive can't be exported.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
     /// The thread can't be started.
     #[error("exporting a dive: its thread can't be started: {0}")]
     Thread(io::Error),
-    /// The thread has ended early.
+    /// The thread has panicked.
     #[error("exporting a dive: its thread has ended early")]
     Ended,
     /// The program was built without the page.
@@ -48,19 +49,19 @@ pub enum ExportError {
     Pack(#[from] io::Error),
 }
 
-/// Collects a dive for a file.
+/// Collects a dive for an exported file.
 pub struct Export {
     sender: mpsc::Sender<Fed>,
     thread: JoinHandle<Taken>,
 }
 
-/// Collected data.
+/// Data collected by the thread.
 struct Taken {
     model: Model,
     states: States,
 }
 
-/// States, one a second or fewer.
+/// States of the dive, at most one per second.
 struct States {
     every_s: f64,
     all: Vec<(f64, Map<String, Value>)>,
@@ -88,13 +89,14 @@ impl Export {
         Ok(Self { sender, thread: thread.map_err(ExportError::Thread)? })
     }
 
-    /// Collector for a loop's results; it waits if necessary.
+    /// Returns a collector for a loop's results. The collector waits for room in the queue.
     pub fn collector(&self, dive: &Loop) -> Collector {
         Collector::new(self.sender.clone(), dive, true, false, None)
     }
 
-    /// The page with the dive. `alerts` are all of the dive, `voices` the recordings of its notes, `end` its last
-    /// message. All collectors must have been dropped.
+    /// Returns the page with the dive. All collectors must have been dropped.
+    ///
+    /// `alerts` are all alerts of the dive, `voices` the recordings of its notes, and `end` its last message.
     ///
     /// Errors: see [`ExportError`].
     pub fn page(self, alerts: &Value, voices: &[Voice], end: &Value) -> Result<Vec<u8>, ExportError> {
@@ -112,14 +114,15 @@ impl Export {
     }
 }
 
-/// Adds a policy to the page that allows only its own script and no network access, because a dive contains foreign
-/// data.
+/// Adds a content security policy to the page, because a dive contains untrusted data.
+///
+/// The policy allows only the page's own scripts, and no network access.
 fn with_policy(page: &str) -> Option<String> {
     let (head, rest) = page.split_at(page.find("<head>")? + "<head>".len());
     let hashes =
         scripts_of(page).map(|script| format!(" 'sha256-{}'", STANDARD.encode(Sha256::digest(script))));
     let hashes: String = hashes.collect();
-    // Styles are inline, including those set by the charts; voice notes play from blobs.
+    // The charts set inline styles, and voice notes play from blobs, so the policy allows both.
     Some(format!(
         "{head}\n<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src{hashes}; \
          style-src 'unsafe-inline'; img-src data: blob:; media-src data: blob:; connect-src 'none'; base-uri 'none'; \
@@ -127,7 +130,7 @@ fn with_policy(page: &str) -> Option<String> {
     ))
 }
 
-/// The texts of a page's inline scripts.
+/// Returns the texts of a page's inline scripts.
 fn scripts_of(page: &str) -> impl Iterator<Item = &str> {
     page.split("<script")
         .skip(1)
@@ -135,7 +138,7 @@ fn scripts_of(page: &str) -> impl Iterator<Item = &str> {
 }
 
 impl Taken {
-    /// All frames, compressed.
+    /// Returns all frames, compressed.
     fn frames(&self, alerts: &Value, voices: &[Voice], end: &Value) -> io::Result<Vec<u8>> {
         let model = &self.model;
         let mut packed = DeflateEncoder::new(Vec::new(), Compression::default());
@@ -189,7 +192,7 @@ impl States {
         }
     }
 
-    /// The first state completely, and of the others the differences from it.
+    /// Returns the timeline: the first state in full, and the differences of each later state from the first.
     fn timeline(&self) -> Value {
         let first = self.all.first().map(|(_, first)| first);
         let differs = |state: &Map<String, Value>| -> Map<String, Value> {
@@ -222,8 +225,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exported_page_runs_only_its_own_script_and_reaches_nothing() {
-        // The hash of an empty text: `printf '' | openssl dgst -sha256 -binary | base64`.
+    fn exported_page_allows_only_its_own_script_and_no_network() {
+        // The hash in this test is that of an empty text: `printf '' | openssl dgst -sha256 -binary | base64`.
         let page = with_policy("<html><head><title>t</title></head><script type=\"module\"></script></html>")
             .unwrap();
         let (before, after) = page.split_once("<title>").unwrap();
@@ -240,7 +243,7 @@ mod tests {
         let Some(page) = assets::single() else { return };
         let scripts: Vec<_> = scripts_of(page).collect();
         assert!(!scripts.is_empty());
-        // A browser computes the hash after converting these to line feeds.
+        // A browser converts carriage returns to line feeds before it computes the hash.
         assert!(scripts.iter().all(|script| !script.contains('\r')));
         assert!(!page.contains(" src=") && !page.contains("javascript:"), "nothing that the policy forbids");
     }

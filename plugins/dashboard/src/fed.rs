@@ -1,4 +1,4 @@
-//! Messages from the loop's thread to the page's, in a bounded queue.
+//! Messages from the loop's thread to the page's thread, passed through a bounded queue.
 
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::alert_list::NoteJson;
@@ -14,7 +14,7 @@ use crate::wire::{SampleRecord, SectionRecord};
 pub enum Fed {
     /// New data since the last message.
     News(Box<News>),
-    /// Playback has jumped; later messages refer to the new time.
+    /// Playback has jumped to this time, and later messages refer to the time after the jump.
     Jump(MonoNs),
     /// State of playback.
     Playback(PlaybackState),
@@ -22,32 +22,32 @@ pub enum Fed {
     End(Box<Value>),
 }
 
-/// New data.
+/// New data of one or several ticks.
 #[derive(Debug)]
 pub struct News {
-    /// End of the tick.
+    /// End time of the last tick.
     pub now: MonoNs,
-    /// Whether a seek skips this tick: only its samples count, and the rest comes with the jump.
+    /// Whether a seek skips this tick. Then only its samples are used; the state follows with the jump.
     pub is_skipped: bool,
-    /// First time of the dive, once known.
+    /// First time of the dive; `None` while unknown.
     pub begun: Option<MonoNs>,
-    /// The live state, as of the tick.
+    /// The live state at the end of the tick.
     pub state: Box<LiveStateJson>,
     /// Displayed data besides the live state.
     pub beside: Beside,
     /// New samples.
     pub samples: Vec<SampleRecord>,
-    /// Samples sent again for these chainages, m, in place of dropped ones.
+    /// Wall samples read from the loop's store to replace dropped samples.
     pub mended: Vec<SampleRecord>,
     /// Changed sections.
     pub sections: Vec<SectionRecord>,
     /// Events, as JSON objects with a type.
     pub told: Vec<Value>,
-    /// All notes, if there is a new one.
+    /// All notes of the dive; `None` if there is no new note.
     pub notes: Option<Vec<NoteJson>>,
-    /// Stretches to go back for, if they have changed.
+    /// Stretches to go back for; `None` if they haven't changed.
     pub back: Option<Value>,
-    /// Data dropped so far.
+    /// Counts of data dropped so far.
     pub dropped: Dropped,
 }
 
@@ -56,11 +56,11 @@ pub struct News {
 pub struct Beside {
     /// Pose of the vehicle in the cross-section.
     pub pose: Option<PoseJson>,
-    /// The echosounders.
+    /// Last pings of the echosounders.
     pub echosounders: Vec<EchoJson>,
-    /// Rate of readings of each sensor.
+    /// Rate of each sensor.
     pub rates: Vec<RateJson>,
-    /// The recording.
+    /// State of the recording.
     pub recording: RecordingJson,
     /// Verdicts of the same dive for a second target.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -72,9 +72,9 @@ pub struct Beside {
 /// Pose of the vehicle in the cross-section.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PoseJson {
-    /// Left of the axis, m.
+    /// Distance to the left of the tunnel's axis, m.
     pub y_m: f64,
-    /// Above the floor, m.
+    /// Height above the floor, m.
     pub z_m: f64,
     /// Roll, degrees.
     pub roll_deg: f64,
@@ -84,14 +84,14 @@ pub struct PoseJson {
     pub yaw_deg: f64,
 }
 
-/// An echosounder.
+/// The last ping of an echosounder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EchoJson {
-    /// Its id.
+    /// Sensor id.
     pub id: String,
     /// Last range, m; `None` without an echo.
     pub range_m: Option<f64>,
-    /// Age of that range, seconds.
+    /// Time since the ping, seconds.
     pub age_s: f64,
     /// Position of the echosounder in the cross-section, m.
     pub from: [f64; 2],
@@ -102,40 +102,40 @@ pub struct EchoJson {
 /// Rate of a sensor's readings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RateJson {
-    /// Its id.
+    /// Sensor id.
     pub id: String,
-    /// Readings a second.
+    /// Readings per second.
     pub hz: f64,
 }
 
-/// The recording.
+/// State of the recording.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct RecordingJson {
     /// Whether the dive is recorded.
     pub on: bool,
-    /// Whether present data is lost, or would be lost in a power cut.
+    /// Whether data is being lost, or would be lost in a power cut.
     pub fails: bool,
-    /// Displayed text, the same on all screens; `None` while all is well.
+    /// Displayed text, the same on all screens; `None` if recording works.
     pub words: Option<String>,
     /// Path of the recording.
     pub path: Option<String>,
 }
 
-/// Data dropped because the queue was full.
+/// Counts of data dropped because the queue was full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Dropped {
-    /// Samples; wall samples are sent again.
+    /// Number of samples. Wall samples among these are sent again from the loop's store.
     pub samples: u64,
-    /// Lines.
+    /// Number of events.
     pub told: u64,
 }
 
 /// State of playback.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlaybackState {
-    /// Whether it is paused.
+    /// Whether playback is paused.
     pub paused: bool,
-    /// Speed as a multiple of real time; `None` is as fast as possible.
+    /// Speed as a multiple of real time; `None` plays as fast as possible.
     pub speed: Option<f64>,
     /// Present position, seconds on the log's clock.
     pub at_s: f64,

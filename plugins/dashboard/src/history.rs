@@ -1,24 +1,24 @@
-//! History of speed, allowed speed and forecast T over the last half hour, one value a second.
+//! History of speed, allowed speed and forecast T over the last half hour, with one value per second.
 
 use std::collections::VecDeque;
 
 use headrace_monitor::live_state::json::LiveStateJson;
 use serde_json::{Value, json};
 
-/// Number of values kept: half an hour.
+/// Maximum number of values: half an hour.
 const MOST: usize = 1800;
 
-/// The history.
+/// History of a dive.
 #[derive(Debug, Default)]
 pub struct History {
-    /// Time, speed, allowed speed, T; seconds, m/s, m.
+    /// Time, s; then speed, m/s, allowed speed, m/s, and forecast T, m.
     values: VecDeque<(f64, [Option<f64>; 3])>,
-    /// Whether the history of the whole dive is kept.
+    /// Whether the whole dive is kept instead of the last half hour.
     pub(crate) whole: bool,
 }
 
 impl History {
-    /// Adds a state, once a second.
+    /// Adds the values of a state, at most once a second.
     pub(crate) fn take(&mut self, state: &LiveStateJson) {
         let Some(at_s) = state.at_s else { return };
         let second = at_s.floor();
@@ -32,12 +32,12 @@ impl History {
         }
     }
 
-    /// Removes values later than a time, seconds.
+    /// Removes values later than this time, seconds.
     pub(crate) fn jump(&mut self, at_s: f64) {
         self.values.retain(|(second, _)| *second <= at_s);
     }
 
-    /// The history as a message.
+    /// Returns the history as a message.
     pub(crate) fn message(&self, seq: u64) -> Value {
         let column = |place: usize| -> Vec<Value> {
             let of = |(_, values): &(f64, [Option<f64>; 3])| {

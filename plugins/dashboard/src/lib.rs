@@ -1,9 +1,10 @@
 //! The operator's page: a model of the dive, and the server that sends it to browsers.
 //!
-//! [`collector`] takes values from the loop between ticks and hands them to the page's thread in a bounded queue. In
-//! a live dive it never waits. On the page's thread [`model`] holds the displayed data, without I/O, and [`server`]
-//! sends each message, encoded once, to all viewers. `docs/how-to/read-the-page.md` is for users,
-//! `docs/reference/page-feed.md` for authors of other clients.
+//! Between ticks [`collector`] takes values from the loop and passes them to the page's thread through a bounded
+//! queue. In a live dive it never waits. On the page's thread, [`model`] holds the displayed data without I/O.
+//! [`server`] encodes each message once and sends it to all viewers.
+//!
+//! `docs/how-to/read-the-page.md` is for users, `docs/reference/page-feed.md` for authors of other clients.
 
 pub mod access;
 pub mod assets;

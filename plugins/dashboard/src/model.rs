@@ -1,7 +1,7 @@
-//! Displayed data of the page, as of the last message from the loop; without sockets and clocks.
+//! The page's displayed data, as of the last message from the loop. The model uses neither sockets nor clocks.
 //!
-//! Each message has a number, and each section stores the number of the last message that contained it. So a viewer
-//! that reconnects gets the changes since then, and a new viewer gets everything.
+//! Each message has a number, and each section stores the number of the last message that contained it. A viewer that
+//! reconnects therefore gets only later changes, and a new viewer gets everything.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -18,22 +18,22 @@ use crate::samples::Samples;
 use crate::site::{Greeting, May, Site};
 use crate::wire::{SectionRecord, sample_frame, section_frame};
 
-/// Number of events kept for viewers that reconnect.
+/// Maximum number of events kept for viewers that reconnect.
 const MOST_TOLD: usize = 256;
-/// Largest number of samples in one message: 100 kB/s at five messages a second. Beyond it samples are thinned;
-/// `/samples` has all.
+/// Maximum number of samples in one message: 100 kB/s at five messages a second. More samples are thinned; `/samples`
+/// returns all of them.
 const MOST_AT_ONCE: usize = 1000;
-/// Largest number of samples for a viewer that connects or reconnects.
+/// Maximum number of samples sent to a viewer that connects or reconnects.
 const MOST_BACK: usize = 10_000;
-/// Number of messages whose sample positions are kept: five minutes of them.
+/// Number of messages whose sample counts are kept: five minutes of messages.
 const MOST_PLACES: usize = 1500;
-/// Largest number of samples in the answer to a range of chainage.
+/// Maximum number of samples in the answer to a request for a range of chainage.
 pub const MOST_IN_RANGE: usize = 200_000;
 
-/// Kind of a message, for viewers that don't want all.
+/// Sort of a message, for viewers that want only some messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sort {
-    /// The state, which the next one replaces.
+    /// A state, which replaces the previous one.
     State,
     /// New samples.
     Samples,
@@ -44,24 +44,24 @@ pub enum Sort {
 /// A message, encoded once for all viewers.
 #[derive(Debug, Clone)]
 pub struct Message {
-    /// Sequence number.
+    /// Number of the message.
     pub seq: u64,
-    /// Kind.
+    /// Sort of the message.
     pub sort: Sort,
-    /// Its bytes.
+    /// Content of the message.
     pub body: Body,
 }
 
-/// Bytes of a message.
+/// Encoded content of a message.
 #[derive(Debug, Clone)]
 pub enum Body {
-    /// JSON.
+    /// Text in JSON.
     Text(Utf8Bytes),
-    /// A frame.
+    /// A binary frame.
     Binary(Bytes),
 }
 
-/// A section with the parts where it has samples, and the last message that contained it.
+/// A section, a bit mask of the parts that have samples, and the last message that contained the section.
 #[derive(Debug, Clone, Copy)]
 struct Shown {
     record: SectionRecord,
@@ -69,7 +69,7 @@ struct Shown {
     seq: u64,
 }
 
-/// The model.
+/// Model of the displayed data.
 #[derive(Debug)]
 pub struct Model {
     site: Site,
@@ -80,9 +80,9 @@ pub struct Model {
     sections: BTreeMap<i32, Shown>,
     changed: Vec<i32>,
     samples: Samples,
-    /// Number of samples sent.
+    /// Number of samples sent to viewers so far.
     sent_samples: usize,
-    /// Number of samples at each message.
+    /// Message numbers, each with the number of samples sent up to that message.
     places: VecDeque<(u64, usize)>,
     state: Option<Box<(Box<LiveStateJson>, Beside)>>,
     state_is_new: bool,
@@ -99,7 +99,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Creates an empty model. `instance` is its unique name.
+    /// Creates an empty model. `instance` is a unique name of this run.
     pub fn new(site: Site, instance: String) -> Self {
         Self {
             site,
@@ -127,12 +127,12 @@ impl Model {
         }
     }
 
-    /// Keeps the history of the whole dive.
+    /// Makes the model keep the history of the whole dive.
     pub fn keep_whole(&mut self) {
         self.history.whole = true;
     }
 
-    /// Applies a message from the loop; returns whether it must be displayed at once.
+    /// Applies a message from the loop. Returns whether the change must be displayed at once.
     pub fn take(&mut self, fed: Fed) -> bool {
         match fed {
             Fed::News(news) => return self.news(*news),
@@ -224,12 +224,12 @@ impl Model {
         u32::try_from(since).unwrap_or(u32::MAX)
     }
 
-    /// Unique name of this dive and, in a replay, of the part after its last seek.
+    /// Returns the unique name of this dive. In a replay each seek gives a new name.
     pub fn instance(&self) -> String {
         if self.jumps == 0 { self.instance.clone() } else { format!("{}.{}", self.instance, self.jumps) }
     }
 
-    /// Changes since the last call, for all viewers.
+    /// Returns the changes since the last call, as messages for all viewers.
     pub fn flush(&mut self) -> Vec<Message> {
         let mut messages = Vec::new();
         for value in core::mem::take(&mut self.told_new) {
@@ -262,7 +262,7 @@ impl Model {
         messages
     }
 
-    /// The state again, for viewers of a paused dive.
+    /// Returns the present state as a new message, for viewers of a paused dive.
     pub fn again(&mut self) -> Option<Message> {
         let state = self.state()?;
         Some(self.text(state, Sort::State))
@@ -314,11 +314,12 @@ impl Model {
         Message { seq: self.seq, sort, body: Body::Binary(bytes.into()) }
     }
 
-    /// Messages for a viewer that connects: everything, or the changes since message `since`. New data must have been
-    /// flushed.
+    /// Returns the messages for a viewer that connects: everything, or only the changes since message `since`.
+    ///
+    /// Call [`Model::flush`] first.
     pub fn catch_up(&self, since: Option<u64>, may: May, tokens_needed: bool) -> Vec<Message> {
         let since = since.filter(|since| *since <= self.seq);
-        // A viewer that loses its connection on the way resumes from its own number.
+        // These messages carry the number `since`, so that a viewer disconnected among them resumes from there.
         let low = since.unwrap_or(0);
         let text = |value: &Value| {
             let body = Body::Text(numbered(value, low).to_string().into());
@@ -356,14 +357,15 @@ impl Model {
         messages
     }
 
-    /// Number of samples that a viewer had received with this message; `None` if no longer known.
+    /// Returns the number of samples sent up to message `since`; `None` if it is no longer known.
     fn samples_until(&self, since: u64) -> Option<usize> {
         let place = self.places.partition_point(|(seq, _)| *seq <= since).checked_sub(1)?;
         self.places.get(place).map(|(_, count)| *count)
     }
 
-    /// Start of the voice note with an id, seconds on the log's clock; `None` without such a note or without a
-    /// recording.
+    /// Returns the start of the voice note with this id, seconds on the log's clock.
+    ///
+    /// Returns `None` if there is no such note, or it has no recording.
     pub(crate) fn spoken_s(&self, id: u32) -> Option<f64> {
         let is_it = |note: &&NoteJson| {
             note.voice.as_ref().is_some_and(|voice| voice.id == id && voice.seconds.is_some())
@@ -371,7 +373,7 @@ impl Model {
         self.notes.iter().find(is_it).map(|note| note.at_s)
     }
 
-    /// All alerts and notes.
+    /// Returns the messages that list all alerts and notes.
     fn lists(&self) -> Vec<Value> {
         let state = self.state.as_ref().map(|shown| &shown.0);
         let (list, hidden) =
@@ -382,7 +384,7 @@ impl Model {
         ]
     }
 
-    /// The first message.
+    /// Returns the first message to a viewer.
     pub fn hello(&self, may: May, tokens_needed: bool, thinned: Option<usize>) -> Value {
         let begun_s = self.begun.map_or(0.0, MonoNs::as_secs_f64);
         let instance = self.instance();
@@ -391,7 +393,7 @@ impl Model {
             .unwrap_or_else(|error| json!({"error": error.to_string()}))
     }
 
-    /// The state.
+    /// Returns the state as a message.
     pub fn state(&self) -> Option<Value> {
         let (state, beside) = &**self.state.as_ref()?;
         let mut value = serde_json::to_value(state).ok()?;
@@ -407,49 +409,51 @@ impl Model {
         Some(value)
     }
 
-    /// Time of the state, seconds.
+    /// Returns the time of the state, seconds.
     pub fn now_s(&self) -> Option<f64> {
         self.state.as_ref().map(|shown| shown.0.now_s)
     }
 
-    /// Samples between two chainages, m, in a frame, at most [`MOST_IN_RANGE`]; and the thinning step.
+    /// Returns a frame with the samples between two chainages, m, and the thinning step.
+    ///
+    /// The frame has at most [`MOST_IN_RANGE`] samples.
     pub fn samples_frame(&self, from_m: f32, to_m: f32) -> (Vec<u8>, usize) {
         let (samples, step) = self.samples.between(from_m, to_m, MOST_IN_RANGE);
         (sample_frame(self.seq, &samples), step)
     }
 
-    /// The samples.
+    /// Returns all samples.
     pub fn samples(&self) -> &Samples {
         &self.samples
     }
 
-    /// Data dropped on the way to the page.
+    /// Returns the counts of data dropped on the way to the page.
     pub fn dropped(&self) -> Dropped {
         self.dropped
     }
 
-    /// Number of the last message.
+    /// Returns the number of the last message.
     pub fn seq(&self) -> u64 {
         self.seq
     }
 
-    /// Number of sections.
+    /// Returns the number of sections.
     pub fn sections(&self) -> usize {
         self.sections.len()
     }
 
-    /// The site.
+    /// Returns the site.
     pub fn site(&self) -> &Site {
         &self.site
     }
 
-    /// All sections in a frame.
+    /// Returns all sections as a frame.
     pub fn sections_frame(&self) -> Vec<u8> {
         let all: Vec<_> = self.sections.values().map(|shown| (shown.record, shown.seen)).collect();
         section_frame(self.seq, &all)
     }
 
-    /// Alerts, notes and the history, as messages.
+    /// Returns alerts, notes, history and the way back as messages, for an exported file.
     pub fn closing(&self) -> Vec<Value> {
         let mut all = self.lists();
         all.push(self.history.message(self.seq));
@@ -457,13 +461,13 @@ impl Model {
         all
     }
 
-    /// End of the dive, once it has ended.
+    /// Returns the last message of the dive; `None` if the dive hasn't ended.
     pub fn end(&self) -> Option<&Value> {
         self.end.as_ref()
     }
 }
 
-/// Adds a number to a message.
+/// Returns a message with a number added.
 fn numbered(value: &Value, seq: u64) -> Value {
     let mut value = value.clone();
     if let Some(object) = value.as_object_mut() {

@@ -3,10 +3,11 @@
 use qrcode::render::unicode::Dense1x2;
 use qrcode::{EcLevel, QrCode};
 
-/// Lines of a code for `text`, dark modules as gaps; `None` if the text is too long.
+/// Returns the lines of a QR code, with dark modules as gaps; `None` if the text is too long.
 pub fn qr(text: &str) -> Option<String> {
     let code = QrCode::with_error_correction_level(text, EcLevel::L).ok()?;
-    // Terminals are mostly dark, so their characters are light. The renderer's `Dark` is the part that it draws.
+    // Most terminals are dark with light characters, so the light modules are drawn. The renderer draws `Dark`, hence
+    // the swap.
     Some(code.render::<Dense1x2>().dark_color(Dense1x2::Light).light_color(Dense1x2::Dark).build())
 }
 
@@ -15,7 +16,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn qr_code_has_three_finders_and_a_margin() {
+    fn qr_code_has_a_margin_and_finder_patterns() {
         let code = qr("http://192.168.2.2:8881/login?token=0123456789abcdef0123456789abcdef").unwrap();
         let lines: Vec<&str> = code.lines().collect();
         assert!(lines.iter().all(|line| line.chars().count() == lines[0].chars().count()));

@@ -1,14 +1,14 @@
-//! Samples of a dive in order of arrival: 20 bytes each, in chunks, searched by chainage.
+//! Samples of a dive in order of arrival, 20 bytes each. They are stored in chunks that are searched by chainage.
 
 use crate::wire::SampleRecord;
 
-/// Number of samples in a chunk: 1.25 MiB.
+/// Number of samples in a chunk, which then takes 1.25 MiB.
 const CHUNK: usize = 1 << 16;
-/// Largest number of samples kept: 160 MB, more than 7 km with four heads in ten hours need. Further samples are only
+/// Maximum number of samples kept: 160 MB. Four heads need less for ten hours over 7 km. Further samples are only
 /// counted.
 pub const MOST_SAMPLES: usize = 8_000_000;
 
-/// A chunk with the chainages that it spans.
+/// A chunk of samples and its range of chainage.
 #[derive(Debug)]
 struct Chunk {
     samples: Vec<SampleRecord>,
@@ -16,13 +16,13 @@ struct Chunk {
     to_m: f32,
 }
 
-/// Samples, of which the first ones are visible: a replay that has jumped back stores more than it shows.
+/// Samples of a dive. After a replay jumps back, only the samples before the new time are visible.
 #[derive(Debug, Default)]
 pub struct Samples {
     chunks: Vec<Chunk>,
     kept: usize,
     visible: usize,
-    /// Time of each tick with the number of samples up to it, in order of time. Kept for seeks.
+    /// End time of each tick, ms, with the number of samples up to that time. Kept for seeks.
     marks: Vec<(u32, u32)>,
     not_kept: u64,
 }
@@ -33,18 +33,20 @@ impl Samples {
         self.visible
     }
 
-    /// Whether there are none.
+    /// Whether no sample is visible.
     pub fn is_empty(&self) -> bool {
         self.visible == 0
     }
 
-    /// Number of samples that weren't kept for lack of room.
+    /// Number of samples dropped because the store was full.
     pub fn not_kept(&self) -> u64 {
         self.not_kept
     }
 
-    /// Adds the samples of a tick that ended `at_ms` after the beginning. After a seek back, samples of known ticks
-    /// become visible again. `marked` is for dives that may be sought.
+    /// Adds the samples of a tick that ended `at_ms` after the dive began.
+    ///
+    /// After a seek back, the stored samples of a tick become visible again. `marked` is true for dives that support
+    /// seeks.
     pub fn take(&mut self, at_ms: u32, new: &[SampleRecord], marked: bool) {
         if marked && self.marks.last().is_some_and(|(last, _)| at_ms <= *last) {
             self.visible = self.visible.max(self.count_at(at_ms));
@@ -59,7 +61,7 @@ impl Samples {
         }
     }
 
-    /// Shows the samples up to a time.
+    /// Makes only the samples up to a time visible.
     pub fn jump(&mut self, at_ms: u32) {
         self.visible = self.count_at(at_ms);
     }
@@ -86,14 +88,14 @@ impl Samples {
         }
     }
 
-    /// Visible samples from this number on.
+    /// Returns visible samples, beginning with sample number `first`.
     pub fn since(&self, first: usize) -> impl Iterator<Item = &SampleRecord> {
         let (whole, part) = (first / CHUNK, first % CHUNK);
         let chunks = self.chunks.iter().skip(whole).flat_map(|chunk| chunk.samples.iter());
         chunks.skip(part).take(self.visible.saturating_sub(first))
     }
 
-    /// Visible samples between two chainages, thinned to at most `most`. Returns them and the thinning step.
+    /// Returns visible samples between two chainages, thinned to at most `most`, and the thinning step.
     pub fn between(&self, from_m: f32, to_m: f32, most: usize) -> (Vec<SampleRecord>, usize) {
         let count = self.each(from_m, to_m).count();
         let step = count.div_ceil(most.max(1)).max(1);
@@ -128,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_found_across_chunks_and_thinned() {
+    fn sample_ranges_span_chunks_and_are_thinned() {
         let samples = filled(200_000);
         let (some, step) = samples.between(64.9, 66.1, 200_000);
         assert_eq!((some.len(), step, some[0].t_ms), (1201, 1, 64_900));
@@ -139,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn jump_back_hides_samples_and_keeps_none_twice() {
+    fn jump_back_hides_later_samples_and_stores_none_twice() {
         let mut samples = filled(1000);
         samples.jump(49);
         assert_eq!((samples.len(), samples.between(0.0, 9.0, 9999).0.len()), (500, 500));

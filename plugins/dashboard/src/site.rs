@@ -1,51 +1,51 @@
-//! Constants of a dive: tunnel, heads, sensors. The page receives them first.
+//! Constants of a dive: tunnel, heads and sensors. The page receives them in the first message.
 
 use headrace_coverage::{Cause, Unsure};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
 use serde::Serialize;
 
-/// Number of profile points sent, at equal steps of arc length.
+/// Number of profile points sent, spaced equally in arc length.
 const POINTS: u32 = 128;
 
 /// Source of a dive's data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
-    /// Ports.
+    /// Sensors on ports.
     Live,
     /// A simulation.
     Demo,
     /// A log.
     Replay,
-    /// None: a page in a file.
+    /// A page that embeds the dive in its own file.
     File,
 }
 
 /// A profiling head.
 #[derive(Debug, Clone, Serialize)]
 pub struct HeadSite {
-    /// Its id.
+    /// Sensor id.
     pub id: String,
-    /// Number of its source.
+    /// Source number of the head.
     pub source: u16,
-    /// Angles in the vehicle's cross-section that it hides from the head: from and to, degrees, 0 down, growing to
-    /// the left; `to` may exceed 360.
+    /// Angles that the vehicle hides from the head, in the vehicle's cross-section: from and to, degrees. 0 is down,
+    /// and angles grow to the left; `to` may exceed 360.
     pub hidden_deg: Vec<[f64; 2]>,
 }
 
 /// A sensor.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorSite {
-    /// Its id.
+    /// Sensor id.
     pub id: String,
-    /// Its device.
+    /// Plugin of the sensor's device.
     pub plugin: String,
-    /// `head`, `echosounder`, `depth`, `imu`, `velocity_log`, `tether` or `other`.
+    /// Kind of sensor: `head`, `echosounder`, `depth`, `imu`, `velocity_log`, `tether` or `other`.
     pub kind: &'static str,
 }
 
-/// Tunnel, vehicle and dive.
+/// Constants of tunnel, vehicle and dive.
 #[derive(Debug, Clone)]
 pub struct Site {
     /// Source of the dive's data.
@@ -56,33 +56,33 @@ pub struct Site {
     pub vehicle: String,
     /// Target T, m.
     pub target_m: f64,
-    /// Second target for all sections, m.
+    /// Second target, for which all sections are judged too, m; `None` without one.
     pub compared_m: Option<f64>,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Margin of a pass between hole and target, standard deviations.
+    /// Number of standard deviations by which a passing hole must be below the target.
     pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Design profile.
     pub profile: Profile,
-    /// The heads, in the order of their sources.
+    /// The heads, in the order of their source numbers.
     pub heads: Vec<HeadSite>,
-    /// All sensors, in the order of sources.
+    /// All sensors, in the order of their source numbers.
     pub sensors: Vec<SensorSite>,
-    /// UTC of the clock's zero, seconds; `None` if unknown.
+    /// UTC at time zero of the log's clock, seconds; `None` if unknown.
     pub utc_of_zero_s: Option<f64>,
     /// First and last time of a log, seconds.
     pub span_s: Option<[f64; 2]>,
     /// Whether the dive accepts operator commands.
     pub takes_commands: bool,
-    /// Whether it can be paused and sought.
+    /// Whether the dive can be paused and supports seeks.
     pub is_playback: bool,
     /// Path of the recording.
     pub recorded_to: Option<String>,
 }
 
-/// The first message to a viewer. Field names are the contract.
+/// The first message to a viewer. Its field names are part of the feed's interface.
 #[derive(Debug, Serialize)]
 pub(crate) struct Hello<'a> {
     #[serde(rename = "type")]
@@ -119,13 +119,13 @@ pub(crate) struct Hello<'a> {
 /// Rights of a viewer.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct May {
-    /// Acknowledge, silence, note.
+    /// Whether the viewer may acknowledge, silence and note.
     pub operate: bool,
-    /// Pause, seek and so on.
+    /// Whether the viewer may pause, seek and so on.
     pub playback: bool,
 }
 
-/// Part of the first message that depends on the viewer and the moment.
+/// Fields of the first message that depend on the viewer and the time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Greeting<'a> {
     pub(crate) seq: u64,
@@ -133,7 +133,7 @@ pub(crate) struct Greeting<'a> {
     pub(crate) may: May,
     pub(crate) begun_s: f64,
     pub(crate) tokens_needed: bool,
-    /// Thinning step of the samples in a file; `None` if all are there.
+    /// Thinning step of the samples in a file; `None` if the file has all samples.
     pub(crate) thinned: Option<usize>,
 }
 
@@ -171,9 +171,9 @@ impl Site {
         }
     }
 
-    /// Arc length at an hour of the clock, looking inwards: 0 is 12 o'clock, the crown.
+    /// Returns the arc length at a clock hour, looking inwards. 0 is 12 o'clock, the crown.
     fn arc_at_hour_m(&self, hour: u32) -> f64 {
-        // 9 is the left wall: y grows to the left.
+        // 9 o'clock is the left wall, and y grows to the left, hence the minus.
         let (sin, cos) = math::sin_cos(f64::from(hour) / 12.0 * TAU);
         let [y, z] = self.profile.reference();
         self.profile.arc_of([y - sin, z + cos])

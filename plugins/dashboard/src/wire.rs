@@ -1,47 +1,48 @@
-//! Binary frames of the feed, little-endian: a header of 16 bytes, then records of fixed size.
+//! Encodes the feed's binary frames, little-endian: a header of 16 bytes, then records of fixed size.
 //!
 //! `docs/reference/page-feed.md` defines them.
 
 use headrace_coverage::{Cause, Section, Unsure, Verdict};
 
-/// Kind of a frame of sections.
+/// Kind byte of a frame of sections.
 pub const SECTIONS: u8 = 1;
-/// Kind of a frame of samples.
+/// Kind byte of a frame of samples.
 pub const SAMPLES: u8 = 2;
-/// Version of both.
+/// Version byte of both kinds.
 const VERSION: u8 = 1;
-/// Length of a frame's header.
+/// Length of a frame's header, bytes.
 const HEAD_BYTES: usize = 16;
-/// Bytes of a section.
+/// Length of a section record, bytes.
 const SECTION_BYTES: usize = 32;
-/// Bytes of a sample.
+/// Length of a sample record, bytes.
 const SAMPLE_BYTES: usize = 20;
-/// Byte value for none.
+/// Byte that means "none".
 pub(crate) const NONE: u8 = 255;
-/// Resolution of arc lengths: parts of the perimeter, rounded down.
+/// Number of steps in which arc length divides the perimeter.
 const ARC_PARTS: f64 = 65_536.0;
-/// Verdict of an open section that going on won't change.
+/// Verdict byte of an open section that stays open if the vehicle goes on.
 const NOT_INSPECTED: u8 = 4;
 
-/// A section as displayed, without the parts where it has samples.
+/// A section as displayed, without the mask of its parts that have samples.
 #[derive(Debug, Clone, Copy)]
 pub struct SectionRecord {
-    /// Its chainage in lengths of a section.
+    /// Chainage of the section's start, as a multiple of the section length.
     pub index: i32,
-    /// 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
+    /// Verdict: 0 open, 1 pass, 2 fail, 3 can't say, 4 not inspected.
     pub verdict: u8,
-    /// Number of the main cause; 255 for none.
+    /// Number of the main cause; 255 if there is none.
     pub cause: u8,
-    /// Number of the reason for can't say; 255 for none.
+    /// Number of the reason for "can't say"; 255 if there is none.
     pub why: u8,
-    /// Bit 0 flagged, bit 1 settled, bits 2 to 4 the verdict for a second target plus 1, or 0 without one.
+    /// Bit 0: flagged. Bit 1: settled. Bits 2 to 4: verdict for a second target plus 1, or 0 without a second target.
     pub flags: u8,
-    /// Diameter of the hole, its standard deviation, chainage and arc length of its centre, m; NaN for none.
+    /// Diameter of the hole, its standard deviation, and chainage and arc length of its centre, m; NaN if there is
+    /// none.
     pub hole: [f32; 4],
 }
 
 impl PartialEq for SectionRecord {
-    /// Compares bit for bit.
+    /// Compares bit by bit, so that NaN equals NaN.
     fn eq(&self, other: &Self) -> bool {
         let bytes = |of: &Self| [of.verdict, of.cause, of.why, of.flags];
         self.index == other.index
@@ -50,7 +51,7 @@ impl PartialEq for SectionRecord {
     }
 }
 
-/// Index of a value in a list, as a byte.
+/// Returns the index of a value in a list, as a byte; [`NONE`] if there is none.
 fn number<T: PartialEq>(all: &[T], one: Option<T>) -> u8 {
     let place = one.and_then(|one| all.iter().position(|other| *other == one));
     place.and_then(|place| u8::try_from(place).ok()).unwrap_or(NONE)
@@ -115,30 +116,30 @@ impl SectionRecord {
 /// Outcome of a ping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Accepted as wall.
+    /// A return that is accepted as wall.
     Wall = 0,
     /// A return that isn't accepted as wall.
     Doubtful = 1,
-    /// No return; the position is the aim.
+    /// No return. The sample's position is the point that the ping was aimed at.
     NoReturn = 2,
 }
 
-/// A sample as stored and sent: 20 bytes.
+/// A sample as stored and sent, 20 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleRecord {
     /// Milliseconds since the dive began.
     pub t_ms: u32,
     /// Chainage, m.
     pub x_m: f32,
-    /// Left of the axis, m; NaN without a return.
+    /// Distance to the left of the axis, m; NaN without a return.
     pub y_m: f32,
-    /// Above the floor, m; NaN without a return.
+    /// Height above the floor, m; NaN without a return.
     pub z_m: f32,
-    /// Arc length, in 65,536th of the perimeter.
+    /// Arc length, in steps of 1/65,536 of the perimeter.
     pub arc: u16,
-    /// Number of the head.
+    /// Number of the head; 255 if unknown.
     pub head: u8,
-    /// See [`Outcome`].
+    /// Value of [`Outcome`].
     pub outcome: u8,
 }
 
@@ -149,7 +150,7 @@ impl SampleRecord {
         (arc_m / perimeter_m * ARC_PARTS).clamp(0.0, ARC_PARTS - 1.0) as u16
     }
 
-    /// Bit that it sets in its section's `seen`; none if it isn't wall.
+    /// Returns the bit of this sample in the mask `seen` of its section; 0 if the sample isn't wall.
     pub(crate) fn seen(&self) -> u64 {
         if self.outcome == Outcome::Wall as u8 { 1 << (self.arc >> 10) } else { 0 }
     }
@@ -172,7 +173,7 @@ fn frame(kind: u8, count: usize, seq: u64, record_bytes: usize) -> Vec<u8> {
     bytes
 }
 
-/// A frame of sections, each with the parts where it has samples.
+/// Encodes a frame of sections, each with the mask of its parts that have samples.
 pub fn section_frame(seq: u64, sections: &[(SectionRecord, u64)]) -> Vec<u8> {
     let mut bytes = frame(SECTIONS, sections.len(), seq, SECTION_BYTES);
     for (section, seen) in sections {
@@ -181,7 +182,7 @@ pub fn section_frame(seq: u64, sections: &[(SectionRecord, u64)]) -> Vec<u8> {
     bytes
 }
 
-/// A frame of samples.
+/// Encodes a frame of samples.
 pub fn sample_frame(seq: u64, samples: &[SampleRecord]) -> Vec<u8> {
     let mut bytes = frame(SAMPLES, samples.len(), seq, SAMPLE_BYTES);
     for sample in samples {
@@ -195,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_are_as_documented() {
+    fn frames_have_the_documented_layout() {
         let mut section = SectionRecord::blank(-3);
         (section.verdict, section.flags, section.hole) = (2, 3, [0.5, 0.01, 1.25, 7.0]);
         let bytes = section_frame(9, &[(section, 1 << 63 | 1)]);
@@ -213,13 +214,13 @@ mod tests {
     }
 
     #[test]
-    fn arcs_fill_their_range_and_set_a_bit_of_64() {
+    fn arc_length_is_encoded_in_16_bits_and_sets_one_of_64_mask_bits() {
         assert_eq!(
             [0.0, 5.0, 9.999_99, 10.0].map(|arc_m| SampleRecord::arc_of(arc_m, 10.0)),
             [0, 32_768, 65_535, 65_535]
         );
         let at = |arc| SampleRecord { t_ms: 0, x_m: 0.0, y_m: 0.0, z_m: 0.0, arc, head: 0, outcome: 0 };
         assert_eq!([at(0).seen(), at(1023).seen(), at(1024).seen(), at(65_535).seen()], [1, 1, 2, 1 << 63]);
-        assert_eq!(SampleRecord { outcome: 1, ..at(0) }.seen(), 0, "what isn't taken for wall isn't seen");
+        assert_eq!(SampleRecord { outcome: 1, ..at(0) }.seen(), 0, "a sample that isn't wall sets no bit");
     }
 }

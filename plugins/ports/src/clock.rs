@@ -1,11 +1,11 @@
-//! Host clock for timestamping all input.
+//! The host's clock, which gives all input its timestamps.
 
 use std::time::{Duration, SystemTime};
 
 use headrace_geometry::time::{DurNs, MonoNs, UtcNs};
 use rustix::time::{ClockId, clock_gettime};
 
-/// Current time on the host's monotonic clock, which counts from boot and is never set.
+/// Returns the current time on the host's monotonic clock, which counts from boot and is never set.
 pub fn now() -> MonoNs {
     let time = clock_gettime(ClockId::Monotonic);
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
@@ -13,9 +13,10 @@ pub fn now() -> MonoNs {
     MonoNs(seconds.saturating_mul(1_000_000_000).saturating_add(rest))
 }
 
-/// Converts a kernel wall-clock timestamp to the monotonic clock.
+/// Converts a wall-clock timestamp of the kernel to the monotonic clock.
 ///
-/// Keeps the timestamp's age; a timestamp in the future (the wall clock was set back) becomes the current time.
+/// The age of the timestamp is kept. A timestamp in the future, after the wall clock was set back, becomes the
+/// current time.
 pub fn of_wall(stamped: SystemTime) -> MonoNs {
     let now = now();
     let ago = wall().duration_since(stamped).unwrap_or(Duration::ZERO);
@@ -27,14 +28,14 @@ fn wall() -> SystemTime {
     SystemTime::now()
 }
 
-/// Current time on the monotonic clock and in UTC.
+/// Returns the current time on the monotonic clock and in UTC.
 pub fn clock_anchor() -> (MonoNs, UtcNs) {
     let (mono, wall) = (now(), wall());
     let since = wall.duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO);
     (mono, UtcNs(i64::try_from(since.as_nanos()).unwrap_or(0)))
 }
 
-/// Converts `wait` to a `Duration`; zero if negative.
+/// Converts `wait` to a `Duration`. A negative `wait` becomes zero.
 pub(crate) fn duration(wait: DurNs) -> Duration {
     Duration::from_nanos(u64::try_from(wait.0).unwrap_or(0))
 }
@@ -49,7 +50,7 @@ mod tests {
         let second = now();
         assert!(second.0 >= first.0 && first.0 > 0);
         let over = of_wall(stamped);
-        // The thread may have been preempted between the two clock reads.
+        // The system may have preempted the thread between the two clock reads.
         assert!(over.since(first).0 > -1_000_000_000 && over.since(now()).0 <= 0);
         assert!(of_wall(wall() + Duration::from_mins(1)).since(now()).0 <= 0);
     }

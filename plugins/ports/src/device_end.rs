@@ -1,4 +1,6 @@
-//! Device end of a line for rehearsals: pseudoterminals, TCP, UDP and the kernel's CAN and HID, opened by the host as usual.
+//! Emulates the device end of a line, for rehearsals: pseudoterminals, TCP, UDP, and the kernel's CAN and HID.
+//!
+//! The host opens the other end as it opens a real port.
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -15,10 +17,10 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use crate::lines::READ_BYTES;
 use crate::uhid::{self, Identity, VirtualDevice};
 
-/// Baud rate of an emulated serial port.
+/// Baud rate that the host sets on an emulated serial port.
 const BAUD: u32 = 115_200;
 
-/// Device end of a line.
+/// The device end of a line.
 pub struct EmulatedPort {
     end: End,
     /// Address at which the host opens the other end.
@@ -40,7 +42,7 @@ enum End {
     #[cfg(target_os = "linux")]
     Can {
         interface: String,
-        /// `None` while the interface doesn't exist.
+        /// Socket on the interface; `None` while the interface doesn't exist.
         socket: Option<socketcan::CanSocket>,
     },
     Hid(VirtualDevice<File>),
@@ -50,7 +52,7 @@ enum End {
 const MAX_PEERS: usize = 8;
 
 impl EmulatedPort {
-    /// Opens a device end on `carrier`; network ends listen on address `at`.
+    /// Opens a device end on `carrier`. A network end listens on address `at`.
     ///
     /// Errors: the system can't provide such a port, or refuses it.
     pub fn new(carrier: Carrier, at: IpAddr) -> io::Result<Self> {
@@ -67,9 +69,9 @@ impl EmulatedPort {
         }
     }
 
-    /// Reopens a network end at a known address: a network device that was power-cycled.
+    /// Reopens a network end at a known address, as a network device does after a power cycle.
     ///
-    /// Errors: the address is in use; a carrier whose address the system chooses.
+    /// Errors: the address is in use, or the system chooses the address on this carrier.
     pub fn again(connect: &Connect) -> io::Result<Self> {
         match connect {
             Connect::Tcp { address } => tcp(address),
@@ -81,7 +83,7 @@ impl EmulatedPort {
         }
     }
 
-    /// Creates a HID device of this identity through the kernel's uhid.
+    /// Creates a HID device with this identity through the kernel's uhid.
     ///
     /// Errors: the kernel has no uhid, or this user may not open it.
     pub fn hid(identity: &UsbIdentity, descriptor: &[u8]) -> io::Result<Self> {
@@ -97,7 +99,7 @@ impl EmulatedPort {
 
     /// Opens a node on a CAN bus.
     ///
-    /// Errors: no such interface.
+    /// Errors: the interface doesn't exist.
     #[cfg(target_os = "linux")]
     pub fn can(interface: &str) -> io::Result<Self> {
         let socket = Some(can_socket(interface)?);
@@ -106,17 +108,17 @@ impl EmulatedPort {
         Ok(Self { end: End::Can { interface, socket }, connect })
     }
 
-    /// Address at which the host opens the other end.
+    /// Returns the address at which the host opens the other end.
     pub fn connect(&self) -> &Connect {
         &self.connect
     }
 
-    /// True if a host is connected, as far as can be detected.
+    /// Whether a host is connected, as far as this can be detected.
     pub fn is_called(&self) -> bool {
         match &self.end {
             End::Pty { master } => {
                 let mut polled = [PollFd::new(master, PollFlags::IN)];
-                // A pseudoterminal hangs up while no host has it open.
+                // Polling a pseudoterminal's master reports a hang-up while no host has the terminal open.
                 poll(&mut polled, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })).is_ok()
                     && polled.iter().all(|end| !end.revents().contains(PollFlags::HUP))
             }
@@ -128,9 +130,9 @@ impl EmulatedPort {
         }
     }
 
-    /// Next message from the host, if any; an empty message is a keep-alive. Never blocks.
+    /// Returns the next message from the host, without blocking. An empty message is a keep-alive.
     ///
-    /// Errors: this end has failed; a disconnected host is no error.
+    /// Errors: this end has failed. A disconnected host is no error.
     pub fn read(&mut self) -> io::Result<Option<Vec<u8>>> {
         let mut buffer = [0; READ_BYTES];
         let read = match &mut self.end {
@@ -158,7 +160,7 @@ impl EmulatedPort {
             }),
             #[cfg(target_os = "linux")]
             End::Can { .. } => return Ok(None),
-            // Kernel events only, such as open and close.
+            // The kernel would return only events such as open and close here, and no messages.
             End::Hid(_) => return Ok(None),
         };
         match read {
@@ -168,7 +170,7 @@ impl EmulatedPort {
         }
     }
 
-    /// Sends a device message. It is lost if no host is connected or reading.
+    /// Sends a message of the device. The message is lost if no host is connected or reads it.
     ///
     /// Errors: this end has failed.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -203,20 +205,20 @@ impl EmulatedPort {
     }
 }
 
-/// Waits until one of the ends has input, or `wait_ns` nanoseconds have passed.
+/// Waits until one of the ends has input, or until `wait_ns` nanoseconds have passed.
 pub fn wait_for_any<'a>(stands: impl IntoIterator<Item = &'a EmulatedPort>, wait_ns: u32) {
-    // A pseudoterminal without a host reports a hang-up at once, so that poll would never block.
+    // Pseudoterminals without a host are left out: they report a hang-up at once, so poll would never wait.
     let open = stands.into_iter().filter(|stand| !matches!(stand.end, End::Pty { .. }) || stand.is_called());
     let fds: Vec<BorrowedFd<'_>> = open.flat_map(EmulatedPort::fds).collect();
     let mut polled: Vec<PollFd<'_>> = fds.iter().map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
     let wait = Timespec { tv_sec: 0, tv_nsec: i64::from(wait_ns.min(999_999_999)) };
-    // An interrupted wait is shorter, which does no harm.
+    // A signal may end the wait early, which does no harm.
     poll(&mut polled, Some(&wait)).unwrap_or_default();
 }
 
-/// True if the other end has been closed.
+/// Whether an error means that the host has closed the other end.
 fn is_gone(error: &io::Error) -> bool {
-    /// Source: Linux, EIO: returned by a pseudoterminal master while no host has it open.
+    /// A pseudoterminal's master returns this error while no host has the terminal open. Source: Linux, EIO.
     const EIO: i32 = 5;
     use io::ErrorKind as E;
     error.raw_os_error() == Some(EIO)
@@ -231,7 +233,7 @@ fn pty() -> io::Result<EmulatedPort> {
     grantpt(&master)?;
     unlockpt(&master)?;
     let path = ptsname(&master, Vec::new())?.to_string_lossy().into_owned();
-    // Raw mode without echo, set before the host opens it.
+    // Raw mode without echo must be set before the host opens the terminal.
     let mut settings = tcgetattr(&master)?;
     settings.make_raw();
     tcsetattr(&master, OptionalActions::Now, &settings)?;
@@ -263,10 +265,12 @@ fn can_socket(interface: &str) -> io::Result<socketcan::CanSocket> {
     Ok(socket)
 }
 
-/// Sends a frame; it is lost while the interface is down or absent. An interface that reappears is reopened.
+/// Sends a frame, and reopens an interface that has reappeared.
+///
+/// The frame is lost while the interface is down or absent.
 #[cfg(target_os = "linux")]
 fn write_can(interface: &str, socket: &mut Option<socketcan::CanSocket>, bytes: &[u8]) -> io::Result<()> {
-    /// No such device or address, no such device, network is down, no buffer space. Source: Linux, errno.
+    /// No such device or address; no such device; network is down; no buffer space. Source: Linux, errno.
     const GONE: [i32; 2] = [6, 19];
     const LOST: [i32; 2] = [100, 105];
     let number = |error: &io::Error| error.raw_os_error().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Maps system errors of ports to causes, with the command that fixes each.
+//! Maps system errors of ports to causes, each with a command that fixes it.
 
 use std::io;
 
@@ -6,7 +6,7 @@ use crate::discover::remedy_for;
 use crate::fix_hint;
 use crate::open_error::{OpenError, OpenErrorKind};
 
-/// Cause of `error` while probing the device at `what`.
+/// Returns the cause of `error`, which occurred while probing the device at `what`.
 pub(crate) fn probing(what: &str, error: &io::Error) -> OpenError {
     let OpenError { kind, remedy, .. } = opening(what, error);
     let why = match kind {
@@ -16,7 +16,7 @@ pub(crate) fn probing(what: &str, error: &io::Error) -> OpenError {
     OpenError { kind, why, remedy }
 }
 
-/// Cause of `error` while opening `what`.
+/// Returns the cause of `error`, which occurred while opening `what`.
 pub(crate) fn opening(what: &str, error: &io::Error) -> OpenError {
     use io::ErrorKind as E;
     let why = |words: &str| format!("opening {what}: {words}");
@@ -40,9 +40,9 @@ pub(crate) fn opening(what: &str, error: &io::Error) -> OpenError {
     }
 }
 
-/// Cause of `error` while opening a CAN interface.
+/// Returns the cause of `error`, which occurred while opening a CAN interface.
 pub(crate) fn opening_can(interface: &str, error: &io::Error) -> OpenError {
-    /// No such device; network is down; address family not supported. Source: Linux, errno.
+    /// No such device; address family not supported. Source: Linux, errno.
     const ENODEV: i32 = 19;
     const EAFNOSUPPORT: i32 = 97;
     match error.raw_os_error() {
@@ -52,7 +52,7 @@ pub(crate) fn opening_can(interface: &str, error: &io::Error) -> OpenError {
     }
 }
 
-/// Reason for the failure of an open line.
+/// Returns the reason why an open line failed.
 pub(crate) fn losing(error: &io::Error) -> String {
     /// Input/output error; no such device or address; no such device. Source: Linux, errno.
     const UNPLUGGED: [i32; 3] = [5, 6, 19];
@@ -63,7 +63,7 @@ pub(crate) fn losing(error: &io::Error) -> String {
     match error.kind() {
         E::ConnectionRefused => "no device listens there".to_owned(),
         E::ConnectionReset | E::ConnectionAborted => "the device has closed the connection".to_owned(),
-        // The serial library's own `BrokenPipe` has neither an errno nor a message.
+        // A `BrokenPipe` created by the serial library itself has neither an errno nor a message.
         E::BrokenPipe if error.raw_os_error().is_some() => "the device has closed the connection".to_owned(),
         E::BrokenPipe if error.get_ref().is_none() => "the port is gone".to_owned(),
         E::TimedOut | E::WouldBlock => "the device accepts no data".to_owned(),

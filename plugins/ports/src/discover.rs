@@ -1,4 +1,5 @@
-//! Attached serial ports, HID devices, CAN interfaces and I2C buses, listed from the system's files without opening any.
+//! Lists attached serial ports, HID devices, CAN interfaces and I2C buses from the system's files, without opening
+//! any.
 
 pub(crate) mod can;
 mod found;
@@ -16,7 +17,7 @@ pub use rights::Rights;
 
 pub(crate) use rights::remedy_for;
 
-/// All attached devices, ordered by carrier and then by name.
+/// Returns all attached devices, ordered by carrier and then by name.
 pub fn discover(machine: &Machine) -> Vec<Found> {
     let mut all = serial::found(machine);
     all.extend(hid::found(machine));

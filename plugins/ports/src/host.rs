@@ -1,4 +1,4 @@
-//! Interface of a line to its machine, so that tests can replace the machine.
+//! The lines' interface to the machine, which tests can replace.
 
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::connect::Connect;
@@ -9,7 +9,7 @@ use crate::open_error::OpenError;
 
 /// A machine's clock and its ports.
 pub trait Host: Send + Sync {
-    /// Current time on the monotonic clock.
+    /// Returns the current time on the monotonic clock.
     fn now(&self) -> MonoNs;
 
     /// Opens the target of a `connect`.

@@ -1,7 +1,7 @@
-//! I/O shared by all device drivers.
+//! I/O that all device drivers share.
 //!
-//! It has the clock, the lines of every carrier, and the service that opens, reads, timestamps and reopens a line. It
-//! also has device discovery, diagnosis and probing. The drivers are in the device crates and do no I/O; see
+//! Contains the host's clock, the lines of every carrier, and the service that opens, reads, timestamps and reopens a
+//! line. Also contains device discovery, diagnosis and probing. Drivers are in the device crates and do no I/O; see
 //! [`headrace_sensor::driver`].
 
 mod clock;

@@ -1,7 +1,6 @@
-//! Service of one line: opens it, serves its drivers and reopens it after a failure, indefinitely, one step at a
-//! time.
+//! Service of one line: opens the line, serves its drivers, and reopens the line after a failure, indefinitely.
 //!
-//! On real ports each service runs on its own thread.
+//! The service runs step by step. On real ports each service has its own thread.
 
 use std::collections::VecDeque;
 use std::io;
@@ -23,7 +22,7 @@ use crate::open_error::OpenError;
 use crate::status::{LineHistory, Phase, Status, StatusQueue};
 use crate::wake::Waker;
 
-/// Reconnect backoff: initial and maximum pause; shorter for local ports, which are cheap to retry.
+/// Reconnect backoff: first pause, longest pause, and longest pause for local ports, which are cheap to retry.
 const FIRST_PAUSE: DurNs = DurNs::from_millis(250);
 const LONGEST_PAUSE: DurNs = DurNs::from_millis(4_000);
 const LONGEST_LOCAL_PAUSE: DurNs = DurNs::from_millis(1_000);
@@ -36,14 +35,16 @@ const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
 /// Keep-alive interval on an idle connection.
 const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
 
-/// Records line events outside the loop. Line threads call it; sensors are numbered as in the vehicle file.
+/// Receives line events that must be recorded without the loop. Line threads call it.
+///
+/// Sensors are numbered as in the vehicle file.
 pub trait LineRecord: Send + Sync {
-    /// Bytes sent to a sensor.
+    /// Records bytes sent to a sensor.
     fn sent(&self, sensor: usize, at: MonoNs, bytes: &[u8]);
 
-    /// Reports packets of a sensor that were dropped between two times.
+    /// Records that packets of a sensor were dropped between two times.
     ///
-    /// The reason is a full ring, or a carrier that dropped them unread.
+    /// Packets are dropped by a full ring, or unread by the carrier.
     fn lost(&self, sensor: usize, from: MonoNs, to: MonoNs, packets: u64);
 }
 
@@ -51,42 +52,42 @@ pub trait LineRecord: Send + Sync {
 pub struct Attached {
     /// Sensor index, in the order of the vehicle file.
     pub source: usize,
-    /// Writing end of its ring.
+    /// Writing end of the sensor's ring.
     pub port: Port,
-    /// Host-side driver.
+    /// Driver on the host's side.
     pub driver: Box<dyn Driver>,
 }
 
 /// State shared by all lines.
 #[derive(Clone)]
 pub struct Common {
-    /// Clock of the host, and its ports.
+    /// The host's clock and ports.
     pub host: Arc<dyn Host>,
-    /// Flag that ends all services.
+    /// Set to end all services.
     pub stopping: Arc<AtomicBool>,
-    /// Board for changes of status.
+    /// Queue for changes of status.
     pub board: StatusQueue,
-    /// Wakes the loop when packets have arrived.
+    /// Wakes the loop after packets have arrived.
     pub waker: Waker,
-    /// Receives all messages sent to devices, and their losses.
+    /// Receives all messages sent to devices, and counts of dropped packets.
     pub record: Option<Arc<dyn LineRecord>>,
 }
 
 /// A line and the devices on it.
 pub struct LineService {
     connect: Result<Connect, ConnectError>,
-    /// Addresses of the lines before this one, in the order of the vehicle file.
+    /// Addresses of earlier lines, in the order of the vehicle file.
     before: Vec<Connect>,
     devices: Vec<AttachedState>,
     senders: Senders,
     common: Common,
     state: LineState,
-    /// Pause before the next attempt to open it.
+    /// Pause before the next attempt to open the line.
     pause: DurNs,
 }
 
 enum LineState {
-    /// Closed, with the time before which it isn't tried again.
+    /// The line is closed and isn't tried again before this time.
     Closed {
         until: MonoNs,
     },
@@ -96,7 +97,7 @@ enum LineState {
 struct OpenLine {
     line: Box<dyn Line>,
     opened: MonoNs,
-    /// Times of the next health check of the devices, and of the next keep-alive.
+    /// Time of the next health check of the devices, and time of the next keep-alive.
     look_at: MonoNs,
     knock_at: MonoNs,
 }
@@ -105,22 +106,22 @@ struct OpenLine {
 struct AttachedState {
     attached: Attached,
     history: LineHistory,
-    /// Number of dropped packets already recorded, and the end time of that record.
+    /// Number of dropped packets already reported to the record, and time of that report.
     dropped_told: u64,
     dropped_until: MonoNs,
     status: Option<(Phase, String)>,
-    /// Number of good frames so far and at the line's opening, and the times of the last bytes and of the last good
-    /// frame.
+    /// Number of good frames so far, and when the line was opened. Then the times of the last bytes and of the last
+    /// good frame.
     frames: u64,
     frames_before: u64,
     last_bytes: MonoNs,
     last_frame: MonoNs,
 }
 
-/// State of an open line after a step.
+/// State of a line after it has been served once.
 enum Served {
     Open,
-    /// All devices exceeded their silence timeout, so the line is reopened.
+    /// All devices have been silent for longer than their timeouts, so the line is to be reopened.
     InSilence,
 }
 
@@ -155,8 +156,9 @@ impl Wire for Ends<'_> {
 }
 
 impl LineService {
-    /// Creates a closed line. `before` are the addresses of earlier lines; if one leads to the same device, this line
-    /// isn't opened.
+    /// Creates a closed line.
+    ///
+    /// `before` are the addresses of earlier lines. The line isn't opened if one of them leads to the same device.
     pub fn new(
         connect: Result<Connect, ConnectError>,
         before: Vec<Connect>,
@@ -180,7 +182,7 @@ impl LineService {
         Self { connect, before, devices, senders, common, state, pause: FIRST_PAUSE }
     }
 
-    /// Runs until stopped; returns each sensor's line history.
+    /// Runs until all services are to end. Returns each sensor's line history.
     pub(crate) fn run(mut self) -> Vec<(usize, LineHistory)> {
         let sensors: Vec<usize> = self.devices.iter().map(|device| device.attached.source).collect();
         let address = self.connect.as_ref().map_or_else(|error| error.text.clone(), Connect::to_string);
@@ -195,7 +197,7 @@ impl LineService {
         self.end()
     }
 
-    /// Time before which a closed line isn't tried again; `None` if it is open.
+    /// Returns the time before which a closed line isn't tried again; `None` if the line is open.
     pub fn closed_until(&self) -> Option<MonoNs> {
         match self.state {
             LineState::Closed { until } => Some(until),
@@ -203,7 +205,7 @@ impl LineService {
         }
     }
 
-    /// Time at which an open line must be stepped even without new bytes; `None` if it is closed.
+    /// Returns the time at which an open line must be stepped even without new bytes; `None` if the line is closed.
     pub fn due(&self) -> Option<MonoNs> {
         match &self.state {
             LineState::Closed { .. } => None,
@@ -214,7 +216,7 @@ impl LineService {
         }
     }
 
-    /// Opens a closed line, or waits once for bytes on an open one and serves its drivers.
+    /// Opens a closed line. Waits once for bytes on an open line, and serves its drivers.
     pub fn step(&mut self) {
         let closed = LineState::Closed { until: self.common.host.now() };
         self.state = match core::mem::replace(&mut self.state, closed) {
@@ -229,7 +231,7 @@ impl LineService {
         };
     }
 
-    /// Delivers the bytes that the drivers still hold; returns each sensor's line history.
+    /// Closes the line, and delivers the bytes that its drivers still hold. Returns each sensor's line history.
     pub fn end(mut self) -> Vec<(usize, LineHistory)> {
         let closed = LineState::Closed { until: self.common.host.now() };
         if let LineState::Open(mut open) = core::mem::replace(&mut self.state, closed) {
@@ -246,7 +248,7 @@ impl LineService {
         self.devices.into_iter().map(history).collect()
     }
 
-    /// Opens the line, unless an earlier line has its device.
+    /// Opens the line, unless an earlier line uses the same device.
     fn open_line(&self, connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
         match self.before.iter().find(|before| lines::same_device(before, connect)) {
             Some(other) => Err(OpenError::same_device(connect, other)),
@@ -256,7 +258,7 @@ impl LineService {
 
     fn open(&mut self) -> LineState {
         let connect = match self.connect.clone() {
-            // A `connect` that doesn't parse stays invalid.
+            // A `connect` that doesn't parse stays invalid until the program is restarted.
             Err(error) => {
                 self.say_all(Phase::Closed, &error.to_string());
                 return LineState::Closed { until: self.common.host.now() + LONGEST_PAUSE };
@@ -307,14 +309,14 @@ impl LineService {
         }
         self.count_lost();
         match ended {
-            // The displayed silent status stays until the device answers.
+            // No new status: the devices stay "silent" until they answer.
             Ok(()) => tracing::info!("no data, reopening the port"),
             Err(error) => self.lost(&error),
         }
         self.rest()
     }
 
-    /// Keeps the line closed for a while, longer each time.
+    /// Keeps the line closed for a while. Each consecutive pause is twice as long, up to a maximum.
     fn rest(&mut self) -> LineState {
         tracing::debug!(backoff_s = self.pause.as_secs_f64(), "waiting before the next attempt");
         let until = self.common.host.now() + self.pause;
@@ -385,7 +387,7 @@ impl LineService {
         Ok(Served::Open)
     }
 
-    /// Reports drops since the last report to the record.
+    /// Reports the packets dropped since the last report to the record.
     fn tell_dropped(&mut self) {
         let now = self.common.host.now();
         for AttachedState { attached, history, dropped_told, dropped_until, .. } in &mut self.devices {
@@ -397,8 +399,9 @@ impl LineService {
         }
     }
 
-    /// Counts datagrams dropped by the carrier as losses of the line's first device, because their device isn't
-    /// known.
+    /// Adds messages dropped by the carrier to the losses of the line's first device.
+    ///
+    /// The device that sent them isn't known.
     fn count_dropped(&mut self, line: &mut dyn Line) {
         let dropped = line.dropped();
         if let Some(first) = self.devices.first_mut().filter(|_| dropped > 0) {
@@ -407,7 +410,7 @@ impl LineService {
         }
     }
 
-    /// Maximum wait for bytes, bounded by the next driver deadline.
+    /// Returns the maximum wait for bytes, which ends at the next deadline of a driver.
     fn wait_for(&self, now: MonoNs) -> Duration {
         let due = self.devices.iter().filter_map(|device| device.attached.driver.due()).min();
         due.map_or(LOOK, |due| clock::duration(due.since(now)).min(LOOK))
@@ -426,8 +429,8 @@ impl LineService {
 
     /// Wakes drivers that are due, unless another driver on the line awaits an answer.
     ///
-    /// If several await one (e.g. just after opening), the first times out first. Otherwise each would wait for the
-    /// others indefinitely.
+    /// Several drivers may await answers, e.g. just after the line was opened. Then the first one times out first;
+    /// otherwise all would wait for each other indefinitely.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = self.common.host.now();
@@ -444,7 +447,7 @@ impl LineService {
         Ok(())
     }
 
-    /// Runs a driver callback and executes the I/O it requested; a transaction's answer may cause more requests.
+    /// Calls a driver, and performs the I/O that it requests. The answer of a transaction may cause more requests.
     fn drive(
         &mut self,
         line: &mut dyn Line,
@@ -480,13 +483,13 @@ impl LineService {
         }
     }
 
-    /// Updates the devices' statuses; the line's own complaint overrides them.
+    /// Updates the status of each device. A complaint of the line itself overrides them.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
             let (phase, words) = device.judge(now);
             let judged = (phase, with_senders(words, phase, &self.senders, device.attached.driver.as_ref()));
             if complaint.is_some() {
-                // The fault is the line's, so the device's silence timeout restarts.
+                // The line is at fault, not the device, so the device's silence timeout restarts.
                 (device.last_bytes, device.last_frame) = (now, now);
             }
             let (phase, words) = complaint.map_or(judged, |words| (Phase::Closed, words.to_owned()));
@@ -495,7 +498,7 @@ impl LineService {
     }
 }
 
-/// Adds the accepted sender and the rejected ones to a status, if they need to be stated.
+/// Adds the accepted sender and the rejected senders to the text of a status, where there are any.
 fn with_senders(words: String, phase: Phase, senders: &Senders, driver: &dyn Driver) -> String {
     let from = senders.believed.filter(|_| phase == Phase::Running).map(|sender| format!("from {sender}"));
     let parts = [(!words.is_empty()).then_some(words), from, senders.strangers.words()];
@@ -516,13 +519,13 @@ impl AttachedState {
         now.since(self.last_bytes) > self.attached.driver.silence_timeout()
     }
 
-    /// Health of the device, with the reason.
+    /// Returns the device's phase, with the reason.
     fn judge(&mut self, now: MonoNs) -> (Phase, String) {
         let silence_timeout = self.attached.driver.silence_timeout();
         let DeviceHealth { good_frames, identity, complaint, .. } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
-            // Not `now`, because the silence counts from the last bytes.
+            // The frame arrived with the last bytes, which may be earlier than `now`.
             self.last_frame = self.last_bytes;
         }
         if let Some(complaint) = complaint {
@@ -533,7 +536,7 @@ impl AttachedState {
             if good_frames > self.frames_before {
                 return (Phase::Running, identity.unwrap_or_default());
             }
-            // A device that stays silent over a reopened line keeps its silent status.
+            // After a silent line was reopened, its devices stay "silent" until they answer.
             let silent = self.status.clone().filter(|(phase, _)| *phase == Phase::Silent);
             let words = "the line is open, but no frame has arrived yet";
             return silent.unwrap_or_else(|| (Phase::Silent, words.to_owned()));
@@ -548,7 +551,7 @@ impl AttachedState {
         }
     }
 
-    /// Posts a status to the board if it has changed.
+    /// Posts a status to the queue if it has changed.
     fn say(&mut self, board: &StatusQueue, since: MonoNs, phase: Phase, words: &str) {
         if self.status.as_ref().is_some_and(|(last, said)| *last == phase && said == words) {
             return;

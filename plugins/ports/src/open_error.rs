@@ -1,4 +1,4 @@
-//! Causes why a line can't be opened, with fixes.
+//! Reasons why a line can't be opened, each with its fix.
 
 use std::fmt;
 
@@ -17,18 +17,18 @@ pub enum OpenErrorKind {
     Busy,
     /// Several devices match.
     Ambiguous,
-    /// Any other cause.
+    /// Any other reason.
     Other,
 }
 
-/// Cause why a line can't be opened.
+/// Reason why a line can't be opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OpenError {
     /// Kind of error.
     pub kind: OpenErrorKind,
-    /// Cause, as text.
+    /// Reason, as text.
     pub why: String,
-    /// Command that fixes it, if any.
+    /// Advice or command that fixes the problem, if any.
     pub remedy: Option<String>,
 }
 
@@ -44,18 +44,18 @@ impl OpenError {
         Self { kind, why, remedy: remedy.map(str::to_owned) }
     }
 
-    /// No such device file or host.
+    /// The device file or host doesn't exist.
     pub(crate) fn not_there(what: &str) -> Self {
         let why = format!("opening {what}: there is no such port");
         Self::new(OpenErrorKind::Absent, why, Some("plug it in, or run headrace devices"))
     }
 
-    /// Access to a device file is denied.
+    /// Access to the device file is denied.
     pub(crate) fn denied(path: &str, remedy: &str) -> Self {
         Self::new(OpenErrorKind::Denied, format!("opening {path}: this user may not open it"), Some(remedy))
     }
 
-    /// No such CAN interface.
+    /// The CAN interface doesn't exist.
     pub(crate) fn no_interface(interface: &str) -> Self {
         let why = format!("opening {interface}: there is no such CAN interface");
         Self::new(OpenErrorKind::Absent, why, Some(&fix_hint::no_interface(interface)))
@@ -67,13 +67,13 @@ impl OpenError {
         Self::new(OpenErrorKind::Absent, why, Some(fix_hint::CAN_RAW))
     }
 
-    /// A `connect` of a vehicle file that doesn't parse.
+    /// The `connect` in the vehicle file doesn't parse.
     pub fn unusable(error: &ConnectError) -> Self {
         let ConnectError { text, problem, allowed } = error;
         Self::new(OpenErrorKind::Other, format!("connect = {text:?}: {problem}"), Some(allowed))
     }
 
-    /// A device that belongs to another line of the vehicle.
+    /// Another line of the vehicle uses the same device.
     pub(crate) fn same_device(connect: &Connect, other: &Connect) -> Self {
         let why =
             format!("opening {connect}: it leads to the same device as {other}, which another sensor uses");

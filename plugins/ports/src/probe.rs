@@ -12,7 +12,7 @@ use crate::diagnosis;
 use crate::lines::{self, Line, READ_BYTES};
 use crate::open_error::OpenError;
 
-/// Timeout of an answer.
+/// Time to wait for an answer to each query.
 const ANSWER_TIME: DurNs = DurNs::from_millis(400);
 
 /// Result of a probe.
@@ -20,16 +20,17 @@ const ANSWER_TIME: DurNs = DurNs::from_millis(400);
 pub enum Answer {
     /// Identity reported by a device.
     Is(String),
-    /// Number of bytes received that no probe understood.
+    /// Number of received bytes; no probe recognised them.
     Unknown(u64),
-    /// No bytes received.
+    /// No bytes were received.
     Silence,
 }
 
-/// Opens a line and queries each kind of device in turn until one identifies itself. A query without an answer takes
-/// 0.4 s.
+/// Opens a line and queries each kind of device in turn, until one identifies itself.
 ///
-/// Errors: the line can't be opened, or fails; with the fix.
+/// A query without an answer takes 0.4 s.
+///
+/// Errors: the line can't be opened, or fails; the error states the fix.
 pub fn probe(connect: &Connect, probes: &mut [Box<dyn Probe>]) -> Result<Answer, OpenError> {
     let _span = tracing::info_span!("probe", address = %connect).entered();
     tracing::info!(kinds = probes.len(), "probing");
@@ -68,5 +69,5 @@ fn ask(line: &mut dyn Line, probe: &mut dyn Probe, bytes: &mut u64) -> io::Resul
     Ok(None)
 }
 
-/// Shortest wait above zero.
+/// Shortest wait; a wait of zero would mean no timeout.
 const SHORTEST: Duration = Duration::from_millis(1);

@@ -1,4 +1,4 @@
-//! Status of a device's line, for display.
+//! Status of a device and its line, for display.
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,16 +7,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crossbeam::queue::ArrayQueue;
 use headrace_geometry::time::MonoNs;
 
-/// Phase of a device's line.
+/// Phase of a device and its line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Phase {
     /// The line isn't open.
     Closed,
-    /// The line is open, and the silence timeout has passed.
+    /// The line is open, but no data has arrived yet, or none within the silence timeout.
     Silent,
-    /// Bytes arrive, but no valid frame.
+    /// Bytes arrive, but they contain no valid frame.
     Babbling,
-    /// Wrong device, or settings refused.
+    /// The line has another device than expected, or the device refuses its settings.
     Wrong,
     /// Good frames arrive.
     Running,
@@ -35,16 +35,16 @@ impl Phase {
     }
 }
 
-/// Status of a device from a given time on.
+/// Status of a device, which begins at a given time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Status {
     /// Sensor index, in the order of the vehicle file.
     pub source: usize,
     /// Start time of the status.
     pub since: MonoNs,
-    /// Phase.
+    /// Phase of the device.
     pub phase: Phase,
-    /// Reason and fix; the device's identity while it runs.
+    /// Reason and fix; for a running device, its identity.
     pub words: String,
 }
 
@@ -55,22 +55,22 @@ impl fmt::Display for Status {
     }
 }
 
-/// History of a line during a dive.
+/// History of a device's line during a dive.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LineHistory {
     /// Number of times the line was opened.
     pub opened: u64,
     /// Number of times the line was lost, or reopened because of silence.
     pub lost: u64,
-    /// Packets without room in the loop's ring, and messages that the carrier dropped unread.
+    /// Number of packets dropped because the loop's ring was full, or unread by the carrier.
     pub dropped: u64,
-    /// Messages of rejected senders.
+    /// Number of messages from rejected senders.
     pub strangers: u64,
     /// Last status, as text.
     pub last: String,
 }
 
-/// Bounded queue of statuses. When it is full, the oldest ones are dropped and counted.
+/// Bounded queue of statuses. When it is full, the oldest is dropped and counted.
 #[derive(Clone)]
 pub struct StatusQueue {
     shared: Arc<Shared>,
@@ -82,7 +82,7 @@ struct Shared {
 }
 
 impl StatusQueue {
-    /// Creates a board for `capacity` statuses.
+    /// Creates a queue for `capacity` statuses.
     pub fn new(capacity: usize) -> Self {
         let statuses = ArrayQueue::new(capacity.max(1));
         Self { shared: Arc::new(Shared { statuses, dropped: AtomicU64::new(0) }) }
@@ -94,12 +94,12 @@ impl StatusQueue {
         }
     }
 
-    /// Takes the oldest status.
+    /// Takes the oldest status from the queue.
     pub fn next(&self) -> Option<Status> {
         self.shared.statuses.pop()
     }
 
-    /// Number of statuses dropped unread.
+    /// Returns the number of statuses dropped unread.
     pub fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }

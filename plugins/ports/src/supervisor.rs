@@ -1,4 +1,4 @@
-//! Supervisor of all line threads and of the loop that they feed.
+//! Supervises the threads of all lines, and runs the loop that they feed.
 
 use std::convert::Infallible;
 use std::io;
@@ -21,38 +21,40 @@ use crate::line_service::{Attached, Common, LineRecord, LineService};
 use crate::status::{LineHistory, Status, StatusQueue};
 use crate::wake::{self, Waker};
 
-/// Capacity of the status board.
+/// Capacity of the queue of statuses.
 const BOARD: usize = 256;
-/// Loop period without input.
+/// Loop period while no input arrives.
 const PERIOD: Duration = Duration::from_millis(20);
-/// Pause while a slow output holds packets back.
+/// Pause while the loop waits for a slow output.
 const BEHIND: Duration = Duration::from_millis(1);
 
-/// A sensor to be served.
+/// A sensor, with the address and the driver that serve it.
 pub struct Connection {
     /// Sensor index, in the order of the vehicle file.
     pub source: usize,
-    /// Address, or the reason why it doesn't parse.
+    /// Address of the sensor, or the reason why it doesn't parse.
     pub connect: Result<Connect, ConnectError>,
-    /// Writing end of its ring.
+    /// Writing end of the sensor's ring.
     pub port: Port,
-    /// Host-side driver.
+    /// Driver on the host's side.
     pub driver: Box<dyn Driver>,
 }
 
 /// Runs one thread per line. Sensors with the same `connect` share a line.
 pub struct Supervisor {
-    /// Number of sensors, up to the highest index served.
+    /// Number of sensors: the highest sensor index plus one.
     sensors: usize,
     threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
     stopping: Arc<AtomicBool>,
     board: StatusQueue,
-    /// Makes the type not `Send`, because the loop must run on the thread that its wakers know.
+    /// Makes the type not `Send`: the loop must run on this thread, because the lines wake this thread.
     on_this_thread: PhantomData<*const ()>,
 }
 
 impl Supervisor {
-    /// Starts the threads, which wake this thread for the loop. `record` receives line events outside the loop.
+    /// Starts the threads of the lines. The present thread must run the loop, because the lines wake it.
+    ///
+    /// `record` receives line events that don't pass through the loop.
     ///
     /// Errors: a thread can't be started.
     pub fn start(connections: Vec<Connection>, record: Option<Arc<dyn LineRecord>>) -> io::Result<Self> {
@@ -74,19 +76,19 @@ impl Supervisor {
         Ok(supervisor)
     }
 
-    /// Takes the oldest unread status change.
+    /// Takes the oldest change of status.
     pub fn next_status(&self) -> Option<Status> {
         self.board.next()
     }
 
-    /// Runs the loop until `ended` returns true. A tick runs as soon as packets have arrived, or after a period.
+    /// Runs the loop until `ended` returns true. A tick runs when packets arrive, or after the loop period.
     pub fn run(&self, dive: &mut Loop, ended: &dyn Fn() -> bool, after_tick: &mut dyn FnMut(&Loop)) {
         let Ok(()) = feed::drive(dive, &mut LiveFeed { ended }, after_tick);
     }
 
-    /// Stops all threads and drains the rings; returns each sensor's line history, in the order of the sensors.
+    /// Stops all threads and drains the rings. Returns each sensor's line history, in the order of the sensors.
     pub fn stop(mut self, dive: &mut Loop, after_tick: &mut dyn FnMut(&Loop)) -> Vec<LineHistory> {
-        // A panicked thread has already reported itself; the other histories are kept.
+        // A thread that panicked has reported so itself. Its histories are replaced by this one.
         let ended_early =
             LineHistory { last: "its thread has ended early".to_owned(), ..LineHistory::default() };
         let mut all = vec![ended_early; self.sensors];
@@ -107,9 +109,10 @@ impl Supervisor {
     }
 }
 
-/// Ends threads that fill rings, in three steps: notify them, wait for them, and drain the rings. Draining comes
-/// last, because a thread still adds to its ring after the notification. Memory order comes from the end of the
-/// thread, not from the flag.
+/// Ends threads that fill rings, in three steps: notify them, wait for them, and drain the rings.
+///
+/// Rings are drained last, because a thread may still fill its ring after the notification. Joining a thread makes
+/// its writes visible; the flag doesn't.
 fn wind_up<H>(tell: impl FnOnce(), wait: impl FnOnce() -> H, drain: impl FnOnce()) -> H {
     tell();
     let handed_back = wait();
@@ -117,7 +120,7 @@ fn wind_up<H>(tell: impl FnOnce(), wait: impl FnOnce() -> H, drain: impl FnOnce(
     handed_back
 }
 
-/// The ports as feed of a loop: their threads fill the rings.
+/// Live feed of a loop. The threads of the lines fill the rings.
 struct LiveFeed<'a> {
     ended: &'a dyn Fn() -> bool,
 }
@@ -148,14 +151,14 @@ impl Drop for Supervisor {
     }
 }
 
-/// A line: thread name, address, devices on it.
+/// A line: name of its thread, address, and devices on the line.
 type LineOf = (String, Result<Connect, ConnectError>, Vec<Attached>);
 
 fn lines(connections: Vec<Connection>) -> Vec<LineOf> {
     let mut lines: Vec<LineOf> = Vec::new();
     for Connection { source, connect, port, driver } in connections {
         let attached = Attached { source, port, driver };
-        // A `connect` that doesn't parse can't be shared.
+        // Connections with a `connect` that doesn't parse never share a line.
         match lines.iter_mut().find(|line| line.1.is_ok() && line.1 == connect) {
             Some(line) => line.2.push(attached),
             None => lines.push((format!("line {source}"), connect, vec![attached])),
@@ -171,12 +174,12 @@ mod tests {
 
     use super::wind_up;
 
-    /// Ways in which the loop ends a line: functions that notify it, wait for it, and drain its ring.
+    /// How the loop ends a line, given functions that notify the line, wait for it, and drain its ring.
     type Ends = fn(&dyn Fn(), &mut dyn FnMut(), &mut dyn FnMut());
 
-    /// Model of a line's thread, as `LineService::run`.
+    /// Explores a model of a line's thread, which behaves as `LineService::run`.
     ///
-    /// It checks the flag before each step, and at the end delivers the bytes that its driver still holds.
+    /// The thread checks the flag before each step. At its end it delivers the bytes that its driver still holds.
     fn line_and_stop(name: &str, ends: Ends) -> usize {
         explore(name, Some(4), move || {
             let (mut port, mut reader) = packets(96);

@@ -13,13 +13,13 @@
 
 use std::io::Write;
 
-/// Path of the uhid device.
+/// Path of the kernel's uhid device.
 pub const PATH: &str = "/dev/uhid";
 
-/// Maximum length of a report descriptor in the kernel.
+/// Maximum length of a report descriptor, set by the kernel.
 pub const MAX_DESCRIPTOR_BYTES: usize = 4096;
 
-/// Maximum length of a report in the kernel.
+/// Maximum length of a report, set by the kernel.
 pub const MAX_INPUT_BYTES: usize = 4096;
 
 const DESTROY: u32 = 1;
@@ -33,9 +33,9 @@ const SERIAL_BYTES: usize = 64;
 /// Identity of a virtual device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Identity<'a> {
-    /// Product name, up to 127 bytes.
+    /// Product name, at most 127 bytes.
     pub name: &'a str,
-    /// Serial number, up to 63 bytes; distinguishes devices of one model.
+    /// Serial number, at most 63 bytes; it distinguishes devices of one model.
     pub serial: &'a str,
     /// USB vendor id.
     pub vendor_id: u16,
@@ -45,7 +45,7 @@ pub struct Identity<'a> {
     pub descriptor: &'a [u8],
 }
 
-/// Reason why a device could not be created, written or removed.
+/// Reason why a device couldn't be created, written or removed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UhidError {
@@ -54,11 +54,11 @@ pub enum UhidError {
     Size {
         /// Name of the field.
         what: &'static str,
-        /// Its length.
+        /// Length of the field, bytes.
         bytes: usize,
-        /// Minimum length.
+        /// Minimum length, bytes.
         least: usize,
-        /// Maximum length.
+        /// Maximum length, bytes.
         most: usize,
     },
     /// The kernel refused an event.
@@ -66,43 +66,45 @@ pub enum UhidError {
     Refused {
         /// Name of the event.
         event: &'static str,
-        /// The kernel's error.
+        /// Error of the kernel.
         source: std::io::Error,
     },
-    /// The kernel accepted only part of an event, which it never does.
+    /// The kernel accepted only part of an event, which real kernels never do.
     #[error("uhid: {event}: {taken} of {bytes} bytes were taken")]
     Cut {
         /// Name of the event.
         event: &'static str,
-        /// Bytes taken.
+        /// Number of bytes accepted.
         taken: usize,
-        /// Length of the event.
+        /// Length of the event, bytes.
         bytes: usize,
     },
 }
 
-/// A virtual device, present until [`VirtualDevice::unplug`] or until `W` is closed.
+/// A virtual device. It stays plugged in until [`VirtualDevice::unplug`], or until `W` is closed.
 #[derive(Debug)]
 pub struct VirtualDevice<W> {
     kernel: W,
 }
 
 impl<W: Write> VirtualDevice<W> {
-    /// Plugs in a USB device. `kernel` is `/dev/uhid`, opened for writing and unbuffered, because each write is one
-    /// event.
+    /// Plugs in a USB device.
     ///
-    /// The kernel creates `/dev/hidrawN` some time after this returns. Errors: see [`UhidError`].
+    /// `kernel` is `/dev/uhid`, opened for writing without a buffer, because each write must be one event. The kernel
+    /// creates `/dev/hidrawN` some time after this function returns.
+    ///
+    /// Errors: see [`UhidError`].
     pub fn plug(mut kernel: W, identity: &Identity<'_>) -> Result<Self, UhidError> {
         send(&mut kernel, "create a device", &create(identity)?)?;
         Ok(Self { kernel })
     }
 
-    /// Sends an input report of 1 to 4096 bytes, its id first if the descriptor has ids.
+    /// Sends an input report of 1 to 4096 bytes. It begins with its id if the descriptor has report ids.
     pub fn report(&mut self, report: &[u8]) -> Result<(), UhidError> {
         send(&mut self.kernel, "input report", &input(report)?)
     }
 
-    /// Removes the device and returns its writer for reuse.
+    /// Unplugs the device, and returns the writer for reuse.
     pub fn unplug(mut self) -> Result<W, UhidError> {
         send(&mut self.kernel, "destroy the device", &DESTROY.to_ne_bytes())?;
         Ok(self.kernel)
@@ -118,7 +120,7 @@ fn create(identity: &Identity<'_>) -> Result<Vec<u8>, UhidError> {
     push_text(&mut event, "a serial number", identity.serial, SERIAL_BYTES)?;
     event.extend(size.to_ne_bytes());
     event.extend(BUS_USB.to_ne_bytes());
-    // Version and country: zero.
+    // Version and country are zero.
     for word in [u32::from(identity.vendor_id), u32::from(identity.product_id), 0, 0] {
         event.extend(word.to_ne_bytes());
     }
@@ -140,7 +142,7 @@ fn size(what: &'static str, bytes: &[u8], least: usize, most: usize) -> Result<u
     told.ok_or(UhidError::Size { what, bytes: bytes.len(), least, most })
 }
 
-/// Appends a text in a field of `field` bytes, the last of which stays zero.
+/// Appends a text to a field of `field` bytes. The last byte of the field stays zero.
 fn push_text(event: &mut Vec<u8>, what: &'static str, text: &str, field: usize) -> Result<(), UhidError> {
     size(what, text.as_bytes(), 0, field - 1)?;
     event.extend(text.as_bytes());
@@ -159,7 +161,7 @@ fn send(kernel: &mut impl Write, name: &'static str, event: &[u8]) -> Result<(),
 #[cfg(test)]
 mod tests {
     use super::*;
-    /// A vendor-defined device with reports of two bytes.
+    /// A vendor-defined device, with reports of two bytes.
     const DESCRIPTOR: [u8; 21] = [
         0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01, 0x09, 0x02, 0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95,
         0x02, 0x81, 0x02, 0xC0,
@@ -173,7 +175,7 @@ mod tests {
         descriptor: &DESCRIPTOR,
     };
 
-    /// A kernel that records each write and takes at most a given number of bytes of each.
+    /// A kernel that records each write, and accepts at most a given number of bytes of each.
     #[derive(Debug)]
     struct Events {
         taken: Vec<Vec<u8>>,
@@ -219,7 +221,7 @@ mod tests {
 
     #[test]
     #[cfg(target_endian = "little")]
-    fn report_matches_the_worked_example() {
+    fn report_event_matches_the_worked_example() {
         let report = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
         let mut expected = vec![0x0C, 0x00, 0x00, 0x00, 0x0B, 0x00];
         expected.extend(report);
@@ -240,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn oversized_fields_are_refused() {
+    fn fields_of_invalid_length_are_refused() {
         let said = |identity| VirtualDevice::plug(Vec::new(), &identity).unwrap_err().to_string();
         let long = "x".repeat(128);
         let name = Identity { name: &long, ..COUNTER };

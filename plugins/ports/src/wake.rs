@@ -1,27 +1,29 @@
-//! Wakes the loop from the threads of the lines.
+//! Wakes the loop when the line threads have data for it.
 //!
-//! The loop parks on its thread's token, one atomic word. A waker swaps it and makes one system call only if the loop
-//! sleeps. Neither side takes a lock or waits for the other. Packets are in their ring before the token is set, and
-//! the loop reads the rings after it has taken the token. So no packet is missed by a sleep.
+//! The loop parks on its thread's token, an atomic word. A waker sets the token, and makes a system call only if the
+//! loop sleeps. Neither side takes a lock or waits for the other.
+//!
+//! A line puts its packet into the ring before it sets the token. The loop takes the token before it reads the rings.
+//! A sleep therefore can't miss a packet.
 
 use std::time::Duration;
 
-/// Threads that can be parked: the system's, or those of a model.
+/// Functions that park threads: those of the system, or those of a model.
 pub trait Threads {
     /// Handle of a thread.
     type Thread: Clone;
 
-    /// This thread.
+    /// Returns a handle of this thread.
     fn current() -> Self::Thread;
 
     /// Sets a thread's token.
     fn unpark(thread: &Self::Thread);
 
-    /// Waits at most this long for this thread's token, and takes it.
+    /// Waits for this thread's token, at most this long, and takes it.
     fn park(at_most: Duration);
 }
 
-/// The system's threads.
+/// Threads of the system.
 pub struct System;
 
 impl Threads for System {
@@ -40,7 +42,7 @@ impl Threads for System {
     }
 }
 
-/// Wakes the thread that created it.
+/// Wakes the thread on which the waker was created.
 pub struct Waker<T: Threads = System>(T::Thread);
 
 impl<T: Threads> Clone for Waker<T> {
@@ -50,18 +52,18 @@ impl<T: Threads> Clone for Waker<T> {
 }
 
 impl<T: Threads> Waker<T> {
-    /// Creates a waker of this thread.
+    /// Creates a waker for this thread.
     pub fn of_this_thread() -> Self {
         Self(T::current())
     }
 
-    /// Ends the current sleep, or the next one. Earlier writes are visible after it.
+    /// Ends the thread's present sleep, or its next one. The thread then sees all earlier writes.
     pub fn wake(&self) {
         T::unpark(&self.0);
     }
 }
 
-/// Sleeps until this thread is woken, or for `at_most`; returns at once if it was woken since its last sleep.
+/// Sleeps until this thread is woken, at most for `at_most`. Returns at once if it was woken since its last sleep.
 pub(crate) fn sleep<T: Threads>(at_most: Duration) {
     T::park(at_most);
 }
@@ -75,8 +77,7 @@ mod tests {
 
     use super::*;
 
-    /// Threads of a loom model, whose sleeps end only by being woken. A missed wake is a deadlock, which loom
-    /// reports.
+    /// Threads of a loom model. Only a wake ends their sleep, so a missed wake is a deadlock, which loom reports.
     struct Modelled;
 
     impl Threads for Modelled {
@@ -95,8 +96,10 @@ mod tests {
         }
     }
 
-    /// A line's thread sends and wakes as `LineService` does; the loop reads its rings and sleeps as `LiveFeed` does.
-    /// After a deadlock, values that loom checks on drop aren't dropped, because that would cause a second panic.
+    /// A line sends a packet and wakes the loop as `LineService` does. The loop reads its ring and sleeps as
+    /// `LiveFeed` does.
+    ///
+    /// After a deadlock, values that loom checks on drop are not dropped, because that would cause a second panic.
     fn line_and_loop(packets_sent: u8, wakes_first: bool) {
         let (mut port, reader) = packets(64);
         let mut reader = ManuallyDrop::new(reader);
@@ -127,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn no_packet_is_missed_by_a_sleep() {
+    fn sleeping_loop_misses_no_packet() {
         let executions = explore("wake-up of the loop", Some(4), || line_and_loop(2, false));
         assert!(executions > 50, "{executions}");
     }

@@ -1,6 +1,6 @@
-//! Logs of `candump -l` and `candump -L`: one frame per line, `(1436509052.249713) can0 044#2A366C2B`.
+//! Logs of `candump -l` and `candump -L`, with one frame per line: `(1436509052.249713) can0 044#2A366C2B`.
 //!
-//! Source: can-utils, the log file format that its `lib.h` describes.
+//! Source: can-utils, whose `lib.h` describes the format.
 
 use crate::{Clock, Entry, Format, Step};
 
@@ -12,7 +12,7 @@ const STANDARD_IDS: u32 = 0x7FF;
 const EXTENDED_IDS: u32 = 0x1FFF_FFFF;
 const LONGEST_LINE: usize = 512;
 
-/// The format; its streams are the interfaces.
+/// The candump format. Its streams are the CAN interfaces.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Candump;
 
@@ -40,7 +40,7 @@ impl Format for Candump {
                 out.extend(entry);
                 Step::Took(used)
             }
-            // A line without its newline may be truncated anywhere.
+            // A last line without a newline may be truncated anywhere.
             Err(_) if newline.is_none() => Step::More,
             Err(why) => Step::Lost(used, why),
         }
@@ -49,7 +49,7 @@ impl Format for Candump {
 
 const NO_LINE: &str = "no line of candump";
 
-/// Parses the frame of a line; `None` for a frame that the logging machine sent itself.
+/// Parses a line. Returns `None` for a frame that the logging machine sent itself.
 fn entry(line: &[u8]) -> Result<Option<Entry>, &'static str> {
     let line = str::from_utf8(line).map_err(|_| NO_LINE)?;
     let mut fields = line.split_ascii_whitespace();
@@ -77,18 +77,18 @@ fn nanoseconds(text: &str) -> Option<u64> {
     whole.checked_add(fraction.parse::<u64>().ok()? * scale)
 }
 
-/// Parses `044#2A366C2B` or `12345678#R`; eight digits are an extended identifier.
+/// Parses a frame such as `044#2A366C2B` or `12345678#R`. Eight digits are an extended identifier.
 fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let (id_text, data_text) = text.split_once('#').ok_or(NO_LINE)?;
     if data_text.starts_with('#') {
-        return Err("a CAN FD frame, which no sensor accepts");
+        return Err("a CAN FD frame, which no supported sensor sends");
     }
     let hexadecimal = id_text.bytes().all(|byte| byte.is_ascii_hexdigit());
     let number = u32::from_str_radix(id_text, 16).ok().filter(|_| hexadecimal).ok_or(NO_LINE)?;
     let id = match id_text.len() {
         3 if number <= STANDARD_IDS => number,
         8 if number <= EXTENDED_IDS => number | EXTENDED,
-        // The controller's error frames keep their flag.
+        // Error frames of the CAN controller keep their flag.
         8 if number >> 29 == 1 => number,
         _ => return Err(NO_LINE),
     };
@@ -105,7 +105,9 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     Ok(frame)
 }
 
-/// Parses pairs of digits, optionally separated by points; `_E` after eight pairs is the raw length, which is ignored.
+/// Parses pairs of digits, which points may separate.
+///
+/// `_E` after eight pairs is the raw length, which is ignored.
 fn data_bytes(text: &str, data: &mut [u8; 8]) -> Result<u8, &'static str> {
     let text = text.split_once('_').map_or(text, |(data, _)| data);
     let digits: Vec<u8> = text.bytes().filter(|byte| *byte != b'.').collect();
@@ -129,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_become_can_frames() {
+    fn candump_lines_are_parsed_as_can_frames() {
         let got = read("(1436509052.249713) vcan0 044#2A366C2B").unwrap().unwrap();
         assert_eq!((got.stamp_ns, got.stream.as_str()), (1_436_509_052_249_713_000, "vcan0"));
         assert_eq!(got.bytes, [0x44, 0, 0, 0, 4, 0, 0, 0, 0x2A, 0x36, 0x6C, 0x2B, 0, 0, 0, 0]);
@@ -145,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_lines_are_refused() {
+    fn invalid_candump_lines_are_refused() {
         for line in [
             "can0 123 [2] 11 22",
             "(1.0) can0",

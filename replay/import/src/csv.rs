@@ -1,7 +1,7 @@
-//! Tables of values (CSV), one timestamp per row.
+//! Tables of values (CSV) with one timestamp per row.
 //!
-//! Each sensor's emulator encodes the values as the bytes that the sensor would have sent, so that its ordinary decoder
-//! reads them.
+//! Each sensor's emulator encodes its values as the bytes that the sensor would have sent. The ordinary decoder can
+//! then read them.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::Rot;
@@ -17,7 +17,7 @@ use crate::{Clock, Entry, Format, Step};
 const SLOTS: usize = 9;
 const LONGEST_LINE: usize = 1 << 16;
 
-/// A quantity: its name, its index among the sensor's values, and the allowed units with their factors to SI units.
+/// A quantity of a sensor: name, index among the sensor's values, and allowed units with their factors to SI units.
 type Quantity = (&'static str, usize, &'static [(&'static str, f64)]);
 
 const ANGLE: &[(&str, f64)] = &[("rad", 1.0), ("deg", PI / 180.0)];
@@ -28,7 +28,7 @@ const SPEED: &[(&str, f64)] = &[("m/s", 1.0)];
 pub(super) const PRESSURE: &[(&str, f64)] =
     &[("Pa", 1.0), ("hPa", 100.0), ("mbar", 100.0), ("kPa", 1000.0), ("bar", 1e5)];
 
-/// Quantities of a sensor; all are required.
+/// Returns the quantities of a kind of sensor; all of them are required.
 fn quantities(sense: Sense) -> &'static [Quantity] {
     match sense {
         Sense::Head => &[("angle", 0, ANGLE), ("range", 1, LENGTH)],
@@ -50,10 +50,10 @@ fn quantities(sense: Sense) -> &'static [Quantity] {
     }
 }
 
-/// A table with a known header; its streams are the sensors' ids.
+/// The CSV format of a table with a known header. Its streams are the sensors' ids.
 pub struct Csv {
     separator: char,
-    /// Cells of a row.
+    /// Number of cells in a row.
     cells: usize,
     time: (usize, u128),
     clock: Clock,
@@ -61,21 +61,22 @@ pub struct Csv {
     header_passed: bool,
 }
 
-/// A sensor and its columns.
+/// A sensor, and the columns with its values.
 struct Target {
     sensor: EmulatedSensor,
-    /// For each value, the column and the factor of its unit.
+    /// For each value, its column and the factor of its unit.
     columns: [Option<(usize, f64)>; SLOTS],
 }
 
 impl Csv {
     /// Creates the format from a mapping, the sensors of a vehicle, and the table's first line.
     ///
-    /// Errors: a key with an invalid value, an unknown sensor or column, a sensor with some of its quantities missing.
+    /// Errors: a key has an invalid value, a sensor or column is unknown, or some quantities of a sensor have no
+    /// column.
     pub fn new(mapping: &Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
-        // Spreadsheets begin their text with a byte order mark.
+        // Spreadsheets begin a file with a byte order mark.
         let header = header.trim_start_matches('\u{feff}');
         let names: Vec<&str> = header.trim().split(separator).map(cell).collect();
         let units = [("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1)];
@@ -113,7 +114,7 @@ impl Csv {
 
     fn row(&mut self, line: &str, out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let cells: Vec<&str> = line.split(self.separator).map(cell).collect();
-        // A row may have more cells than the header if they are empty.
+        // Extra cells at the end of a row are allowed if they are empty.
         if cells.get(self.cells..).is_none_or(|more| more.iter().any(|cell| !cell.is_empty())) {
             return Err(
                 "rows with more or fewer cells than the header: cut short, or numbers contain the separator",
@@ -147,7 +148,7 @@ impl Format for Csv {
             return Step::Took(used);
         }
         if !is_ended {
-            // A truncated number still parses as a number.
+            // A truncated number would parse as another number.
             return Step::Lost(used, "a last row without a line end: it may be cut short, and is skipped");
         }
         let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that aren't UTF-8 text") };
@@ -184,9 +185,9 @@ impl Target {
         Ok(())
     }
 
-    /// Encodes a row's values. A row with only empty cells gives no bytes.
+    /// Encodes the values of a row. A row whose cells for this sensor are all empty gives no bytes.
     ///
-    /// Errors: as text, for cells that can't be parsed or encoded.
+    /// Errors: the reason, as text, if a cell can't be parsed or encoded.
     fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let text = |place: &Option<(usize, f64)>| {
             place.map(|(column, _)| cells.get(column).copied().unwrap_or_default()).unwrap_or_default()
@@ -217,7 +218,9 @@ impl Target {
     }
 }
 
-/// Assembles a value; `None` if a part is missing. A head with an angle and no range had no echo.
+/// Builds a value from its parts; `None` if a part is missing.
+///
+/// A head with an angle and no range had no echo.
 fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<Value> {
     let [a, b, c, d, e, f, g, h, i] = values;
     Some(match sense {
@@ -230,7 +233,7 @@ fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<V
     })
 }
 
-/// Parses a decimal number of units as nanoseconds, exact and truncated.
+/// Parses a decimal number of time units as nanoseconds. The conversion is exact, and the result is rounded down.
 fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     if whole.is_empty() || !whole.bytes().chain(fraction.bytes()).all(|byte| byte.is_ascii_digit()) {
@@ -240,7 +243,7 @@ fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let scale = 10_u128.checked_pow(u32::try_from(fraction.len()).ok()?)?;
     let part = if fraction.is_empty() { 0 } else { fraction.parse::<u128>().ok()? };
     let ns = whole.parse::<u128>().ok()?.checked_mul(unit_ns)?.checked_add(part * unit_ns / scale)?;
-    // Leaves headroom for delays that devices add.
+    // The limit leaves room for the delays that emulators add.
     u64::try_from(ns).ok().filter(|ns| *ns < 1 << 62)
 }
 
@@ -249,7 +252,7 @@ mod tests {
     use super::nanoseconds;
 
     #[test]
-    fn times_are_read_to_the_nanosecond() {
+    fn table_times_are_parsed_to_the_nanosecond() {
         let seconds = 1_000_000_000;
         assert_eq!(nanoseconds("1700000000.123456789", seconds), Some(1_700_000_000_123_456_789));
         assert_eq!(nanoseconds("12", 1000), Some(12_000));

@@ -1,11 +1,11 @@
-//! Recognises kinds of files by their first bytes.
+//! Recognises the kind of a file by its first bytes.
 
 /// First bytes of an ArduPilot dataflash log.
 pub const DATAFLASH: [u8; 2] = *b"\xA3\x95";
-/// Bytes sufficient for recognition.
+/// Number of bytes that recognition needs.
 pub const ENOUGH_BYTES: usize = 64;
 
-/// Probable kind of the file, as text; `None` if unknown.
+/// Returns the probable kind of a file, as text; `None` if unknown.
 pub fn looks_like(front: &[u8]) -> Option<&'static str> {
     const MAGICS: [(&[u8], &str); 16] = [
         (
@@ -38,7 +38,7 @@ pub fn looks_like(front: &[u8]) -> Option<&'static str> {
     if let Some((_, words)) = magic {
         return Some(words);
     }
-    // Eight bytes of time before 2106 in microseconds, then a frame.
+    // A telemetry log begins with eight bytes of time, in microseconds and before 2106, and a frame.
     if front.first() == Some(&0) && matches!(front.get(8), Some(0xFE | 0xFD)) {
         return Some("a telemetry log of MAVLink");
     }

@@ -1,4 +1,5 @@
-//! A sensor of the vehicle file as an emulator. It encodes foreign values as the bytes that the sensor would have sent.
+//! A sensor of the vehicle file as an emulator, which encodes foreign values as the bytes that the sensor would have
+//! sent.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
@@ -9,19 +10,19 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, So
 use headrace_sensor::reading::Level;
 use headrace_vehicle::VehicleConfig;
 
-/// Sample period reported by inertial samples; foreign values have none.
+/// Sample period stated in inertial samples, because foreign values have none.
 const PERIOD: DurNs = DurNs(10_000_000);
 
 /// A value for an emulator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
-    /// A beam of a head: angle, and range if there was an echo.
+    /// A beam of a head: its angle, and its range if there was an echo.
     Beam(f64, Option<f64>),
-    /// An echosounder's range, if there was an echo.
+    /// Range of an echosounder; `None` without an echo.
     Range(Option<f64>),
     /// Absolute pressure, Pa.
     Pressure(f64),
-    /// Attitude, turn rate, rad/s, specific force, m/s^2. NaN where not measured.
+    /// Attitude, turn rate, rad/s, and specific force, m/s^2. Parts that were not measured are NaN.
     Inertia(Rot<Level, Sensor>, [f64; 3], [f64; 3]),
     /// Velocity over ground, m/s.
     Velocity([f64; 3]),
@@ -30,12 +31,12 @@ pub(super) enum Value {
 }
 
 impl Value {
-    /// Whether the value is possible. Limits are far beyond those of tunnels.
+    /// Whether the value is possible, by limits far beyond those of tunnels.
     ///
-    /// Wire formats wrap or clamp larger values into plausible ones.
+    /// Larger values must be refused, because wire formats would wrap or clamp them into plausible ones.
     fn is_possible(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
-        // Values not measured are NaN.
+        // NaN means "not measured", which is allowed.
         let known =
             |values: &[f64; 3], most: f64| values.iter().all(|value| value.is_nan() || value.abs() <= most);
         match self {
@@ -49,20 +50,20 @@ impl Value {
     }
 }
 
-/// Reason text for ranges beyond a head's setting.
+/// Reason for ranges beyond a head's range setting.
 pub(super) const BEYOND: &str = "ranges outside the head's range setting, imported as pings without an echo";
 
 /// A sensor of the vehicle file.
 pub(super) struct EmulatedSensor {
     pub(super) id: String,
     pub(super) sense: Sense,
-    /// For a head, its measurable ranges, m at the site's speed of sound.
+    /// For a head, the measurable ranges, m, at the site's speed of sound.
     reach_m: Option<[f64; 2]>,
     emulated: Emulated,
 }
 
 impl EmulatedSensor {
-    /// Finds the sensor with the id given under `sensor` in a mapping's table.
+    /// Finds the sensor named by `sensor` in a table of the mapping.
     ///
     /// Errors: the vehicle file has no such sensor.
     pub(super) fn named(
@@ -80,7 +81,7 @@ impl EmulatedSensor {
         )
     }
 
-    /// The sensors of a vehicle file, with their ids.
+    /// Returns the sensors of a vehicle file, with their ids.
     pub(super) fn all(vehicle: &VehicleConfig) -> impl Iterator<Item = (&str, &dyn Device)> {
         let ids = vehicle.sensor_configs.iter().map(|config| config.id.as_str());
         ids.zip(vehicle.sensors.iter().map(|device| &**device))
@@ -99,14 +100,14 @@ impl EmulatedSensor {
         Self { id: id.to_owned(), sense: device.sense(), reach_m, emulated: device.emulator(&setup) }
     }
 
-    /// Whether it is a head.
+    /// Whether the sensor is a head.
     pub(super) fn is_head(&self) -> bool {
         self.reach_m.is_some()
     }
 
-    /// A value as the sensor can report it, and whether it had to be changed.
+    /// Returns a value that the sensor can report, and whether it differs from the given value.
     ///
-    /// A beam whose range is outside a head's range setting becomes a beam without an echo.
+    /// A beam whose range is outside the head's range setting becomes a beam without an echo.
     pub(super) fn within_reach(&self, value: Value) -> (Value, bool) {
         match (value, self.reach_m) {
             (Value::Beam(angle_rad, Some(range_m)), Some([least_m, most_m]))
@@ -118,9 +119,9 @@ impl EmulatedSensor {
         }
     }
 
-    /// Emits the bytes that the sensor would have sent, each with its receive time.
+    /// Emits the bytes that the sensor would have sent, with their receive times.
     ///
-    /// `false` if the sensor can't encode the value, or the value is impossible.
+    /// Returns `false` if the value is impossible, or the sensor can't encode it.
     pub(super) fn tell(&mut self, at: MonoNs, value: &Value, sink: &mut dyn FnMut(MonoNs, &[u8])) -> bool {
         if !value.is_possible() {
             return false;

@@ -1,30 +1,30 @@
-//! Entries of a foreign log.
+//! Entries of a foreign log, and results of parsing it.
 
-/// Bytes that a file recorded on a line.
+/// Bytes that a foreign log recorded on one line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
-    /// Timestamp, nanoseconds of the file's clock.
+    /// Timestamp, nanoseconds on the file's clock.
     pub stamp_ns: u64,
-    /// The line, by its name in the format: a CAN interface, for instance.
+    /// Name of the line in the file, such as a CAN interface.
     pub stream: String,
-    /// The bytes as the device sent them.
+    /// Bytes as the device sent them.
     pub bytes: Vec<u8>,
 }
 
-/// Result of parsing the front of the remaining file.
+/// Result of parsing the next bytes of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
-    /// This many bytes were parsed, with or without entries.
+    /// This many bytes were parsed. They may hold no entry.
     Took(usize),
     /// This many bytes were lost, for this reason.
     Lost(usize, &'static str),
-    /// More bytes are needed. At the end of the file the entry is truncated.
+    /// More bytes are needed. At the end of the file, this means that the last entry is truncated.
     More,
-    /// The front has further entries; none of its bytes is consumed yet.
+    /// The same bytes have further entries, so none of them is consumed yet.
     Held,
 }
 
-/// A format's report at the end, as text.
+/// Losses and remarks of a format at the end of an import, as text.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ImportReport {
     /// Losses.
@@ -36,16 +36,16 @@ pub struct ImportReport {
 /// Epoch of a format's timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
-    /// 1970, UTC.
+    /// 1970 in UTC.
     Utc,
-    /// 1970, in the unknown time zone of the machine that wrote the file.
+    /// 1970 in the unknown time zone of the machine that wrote the file.
     Local,
-    /// An epoch specific to the format.
+    /// An epoch that only this kind of file uses.
     Own,
 }
 
 impl Clock {
-    /// Its name in the log's metadata.
+    /// Returns the clock's name in the log's metadata.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Utc => "utc",

@@ -2,44 +2,44 @@
 
 use headrace_replay::log::LogError;
 
-/// A file can't be imported.
+/// Reason why a file can't be imported.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// An I/O error.
+    /// Reading the file fails.
     #[error("reading {name} at byte {offset}: {source}")]
     Read {
-        /// The file.
+        /// File name.
         name: String,
-        /// Offset, bytes.
+        /// Offset in the file, bytes.
         offset: u64,
-        /// Cause.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The file has nothing to import.
+    /// The file has no entry.
     #[error("importing {name}: there is no {what} in its {bytes} bytes{why}")]
     Nothing {
-        /// The file.
+        /// File name.
         name: String,
-        /// Kind of entries searched for.
+        /// Name of the entries that the file should have.
         what: &'static str,
-        /// Length of the file.
+        /// Length of the file, bytes.
         bytes: u64,
-        /// The content found instead, or empty.
+        /// First loss of the file, as text to append; empty if there is none.
         why: String,
     },
-    /// The file isn't a known kind of bag.
+    /// The file isn't a ROS bag of version 2.0.
     #[error("importing {name}: a ROS bag begins with \"#ROSBAG V2.0\", this file with {found:?}")]
     NoBag {
-        /// The file.
+        /// File name.
         name: String,
-        /// Its first bytes.
+        /// First bytes of the file.
         found: String,
     },
     /// The file is a dive log of this program.
     #[error("importing {name}: it is a dive log already; `headrace replay` reads it as it is")]
     DiveLog {
-        /// The file.
+        /// File name.
         name: String,
     },
     /// The log can't be written, or the recording can't be read.

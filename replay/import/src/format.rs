@@ -1,32 +1,35 @@
-//! The interface of file formats, which split a file into entries.
+//! Interface of file formats. A format splits a file into entries.
 
 use crate::entry::{Clock, Entry, ImportReport, Step};
 use crate::order::WINDOW_NS;
 
-/// Maximum number of bytes of the file held in memory, more than the longest entry of any format.
+/// Default limit for the bytes of a file held in memory. Longer entries are lost.
 const MOST_HELD: usize = 1 << 20;
 
-/// Splits a kind of file into entries without I/O: it gets the front of the remaining file.
+/// Splits a file of one kind into entries, without I/O. The caller supplies the bytes.
 pub trait Format {
-    /// Epoch of its timestamps, as far as known from the bytes read.
+    /// Returns the epoch of the timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
 
-    /// Longest entry, bytes.
+    /// Returns the maximum length of an entry, bytes.
     fn most_held(&self) -> usize {
         MOST_HELD
     }
 
-    /// Longest time by which an entry may follow entries with later timestamps, ns.
+    /// Returns how late an entry may come in the file, ns: the longest time by which it may follow entries with later
+    /// timestamps.
     fn reach_ns(&self) -> u64 {
         WINDOW_NS
     }
 
-    /// Its report at the end.
+    /// Returns losses and remarks, at the end of the file.
     fn told(&self) -> ImportReport {
         ImportReport::default()
     }
 
-    /// Parses the front; entries go to `out`. `end` means that nothing follows.
+    /// Parses the next bytes of the file, `front`, and adds entries to `out`.
+    ///
+    /// `end` means that no bytes follow after `front`.
     fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step;
 }
 

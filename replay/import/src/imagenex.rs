@@ -1,14 +1,14 @@
-//! Files of Imagenex's own software.
+//! Files written by Imagenex's own software.
 
 use crate::{Clock, Entry, Format, Step};
 use headrace_geometry::time::DurNs;
 use headrace_imagenex881::logfile::{LogFile, LogFileError};
 
-/// The format; its one stream is [`STREAM`].
+/// The Imagenex format. Its only stream is [`STREAM`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ImagenexFormat;
 
-/// Name of the line with all returns.
+/// Name of the line that carries all returns.
 pub const STREAM: &str = "imagenex";
 
 const DAY_NS: u64 = 86_400_000_000_000;
@@ -38,7 +38,7 @@ impl Format for ImagenexFormat {
     }
 }
 
-/// Nanoseconds since 1970 of a day, month and year, and a time of that day.
+/// Converts a date, as day, month and year, and a time of that day to nanoseconds since 1970.
 fn stamp_ns((day, month, year): (u8, u8, u16), time: DurNs) -> Option<u64> {
     const LENGTHS: [u64; 12] = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let leap = |year: u16| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn dates_count_from_1970() {
+    fn dates_are_converted_to_time_since_1970() {
         let days = |date| stamp_ns(date, DurNs(0)).map(|ns| ns / DAY_NS);
         assert_eq!(days((1, 1, 1970)), Some(0));
         assert_eq!(days((1, 3, 2000)), Some(11_017));

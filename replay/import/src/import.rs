@@ -1,5 +1,6 @@
-//! An import: entries are put in time order, moved to the log's clock and routed to the sensors that would have
-//! received them.
+//! Imports a foreign log.
+//!
+//! Entries are put in time order, moved to the log's clock, and routed to the sensors that would have received them.
 
 use std::io::{Read, Write};
 
@@ -17,26 +18,27 @@ use crate::taker::Taker;
 /// Log time of a file's first entry, the same as in a simulation.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// Longest plausible gap between timestamps. A longer one means several recordings, or that the clock was set.
+/// Longest plausible gap between timestamps. A longer gap means that the clock was set, or the file has several
+/// recordings.
 const LONGEST_GAP: DurNs = DurNs(3_600_000_000_000);
 
 /// A file being imported.
 pub struct Import<S> {
     pub(crate) input: S,
     pub(crate) order: Order,
-    /// The timestamp that becomes [`BEGIN`].
+    /// Timestamp of the file that becomes [`BEGIN`] in the log.
     first_ns: u64,
     clock: Clock,
 }
 
-/// Outcome of an import.
+/// Result of an import.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Imported {
-    /// Entries of the file.
+    /// Number of entries in the file.
     pub entries: u64,
-    /// Entries that belong to no sensor: other parts, other lines.
+    /// Number of entries that belong to no sensor, because of their line or content.
     pub passed_over: u64,
-    /// Messages written, for each source of the log.
+    /// Number of messages written for each source of the log.
     pub messages: Vec<u64>,
     /// Log time of the last message.
     pub last: MonoNs,
@@ -47,7 +49,7 @@ pub struct Imported {
 }
 
 impl<R: Read> Import<Input<R>> {
-    /// Reads until the start time of the file is known. `what` is the name of its entries.
+    /// Opens a file, and reads until its start time is known. `what` is the name of its entries.
     ///
     /// Errors: the file can't be read, or has no entry.
     pub fn open(
@@ -61,9 +63,9 @@ impl<R: Read> Import<Input<R>> {
 }
 
 impl<S: Source> Import<S> {
-    /// Reads until the start time of the recording is known. `what` is the name of its entries.
+    /// Opens a source of entries, and reads until its start time is known. `what` is the name of its entries.
     ///
-    /// Errors: it can't be read, or has no entry.
+    /// Errors: the source can't be read, or has no entry.
     pub fn of(mut input: S, what: &'static str) -> Result<Self, ImportError> {
         let mut order = Order::reaching(input.reach_ns());
         while !order.is_full() && input.more(&mut order)? {}
@@ -80,7 +82,7 @@ impl<S: Source> Import<S> {
         Ok(Self { input, order, first_ns, clock })
     }
 
-    /// Clock metadata for the log: origin of the clock and, if known, the time of day.
+    /// Returns metadata for the log: the clock's epoch and, if known, the time of day at the start.
     pub fn clock_metadata(&self) -> Vec<(String, String)> {
         let mut all = vec![("import_clock".to_owned(), self.clock.as_str().to_owned())];
         if self.clock == Clock::Utc {
@@ -92,9 +94,9 @@ impl<S: Source> Import<S> {
         all
     }
 
-    /// Writes everything that the sensors would have received.
+    /// Writes to the log everything that the sensors would have received.
     ///
-    /// `beside` gets the number of entries so far.
+    /// `beside` is called with the number of entries so far.
     ///
     /// Errors: reading the file or writing the log fails.
     pub fn write<W: Write>(

@@ -1,4 +1,4 @@
-//! Sources of entries.
+//! Sources of entries: files, with the formats that split them.
 
 use std::io::Read;
 
@@ -11,26 +11,26 @@ use crate::order::Order;
 /// Read size, bytes.
 pub(crate) const READ_BYTES: usize = 1 << 16;
 
-/// A source of entries: a file split by a [`Format`], or one with its own reader.
+/// A source of entries: a file split by a [`Format`], or a file with a reader of its own.
 pub trait Source {
-    /// File name.
+    /// Returns the file name.
     fn name(&self) -> &str;
 
-    /// Adds the next entries to `order`. `false` at the end.
+    /// Adds the next entries to `order`. Returns `false` at the end of the file.
     ///
     /// Errors: reading the file fails.
     fn more(&mut self, order: &mut Order) -> Result<bool, ImportError>;
 
-    /// Epoch of its timestamps, as far as known from the bytes read.
+    /// Returns the epoch of the timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
 
-    /// Longest time by which an entry may follow entries with later timestamps, ns.
+    /// Returns the longest time by which an entry may follow entries with later timestamps, ns.
     fn reach_ns(&self) -> u64;
 
-    /// Bytes read.
+    /// Returns the number of bytes read.
     fn bytes(&self) -> u64;
 
-    /// Losses and remarks so far.
+    /// Returns losses and remarks so far.
     fn told(&self) -> ImportReport;
 }
 
@@ -40,9 +40,9 @@ pub struct Input<R, F = Box<dyn Format>> {
     reader: R,
     pub(crate) format: F,
     pub(crate) held: Vec<u8>,
-    /// Bytes of the buffer already consumed.
+    /// Number of bytes of the buffer already consumed.
     done: usize,
-    /// File offset of the buffer's first byte.
+    /// Offset in the file of the buffer's first byte.
     offset: u64,
     end: bool,
     found: Vec<Entry>,
@@ -106,7 +106,7 @@ impl<R: Read, F: Format> Source for Input<R, F> {
 }
 
 impl<R: Read, F: Format> Input<R, F> {
-    /// A file, not yet read.
+    /// Creates a source from a file that hasn't been read yet.
     pub fn new(name: &str, reader: R, format: F) -> Self {
         Self {
             name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! The known kinds of foreign logs.
+//! The kinds of foreign logs that can be imported.
 
 use std::path::Path;
 
@@ -18,11 +18,11 @@ pub enum FileKind {
     Tlog,
     /// Text of `candump -l` or `-L`.
     Candump,
-    /// File of the software of Imagenex 881 and 852.
+    /// File of Imagenex's software for the heads 881 and 852.
     Imagenex,
     /// Log of Ping Viewer.
     Ping,
-    /// Table of values, with a mapping of its columns.
+    /// Table of values, with a mapping that describes its columns.
     Csv,
     /// Bag of ROS 1.
     Rosbag,
@@ -31,11 +31,11 @@ pub enum FileKind {
 }
 
 impl FileKind {
-    /// All kinds.
+    /// All kinds, in the order of their listing.
     pub const ALL: [Self; 7] =
         [Self::Tlog, Self::Candump, Self::Imagenex, Self::Ping, Self::Csv, Self::Rosbag, Self::Mcap];
 
-    /// Recognises a kind by the extension of a file's name, in upper or lower case.
+    /// Recognises a kind by the extension of a file name, in upper or lower case.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
         match extension.as_str() {
@@ -50,7 +50,7 @@ impl FileKind {
         }
     }
 
-    /// Its name.
+    /// Returns the name of the kind.
     pub fn name(self) -> &'static str {
         match self {
             Self::Tlog => "tlog",
@@ -68,7 +68,7 @@ impl FileKind {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// One-line description of such files.
+    /// Returns a one-line description of files of this kind.
     pub fn summary(self) -> &'static str {
         match self {
             Self::Tlog => "Telemetry log of MAVLink",
@@ -81,7 +81,7 @@ impl FileKind {
         }
     }
 
-    /// Name of one of its entries.
+    /// Returns the name of one entry in files of this kind.
     pub fn entries(self) -> &'static str {
         match self {
             Self::Tlog | Self::Candump => "frame",
@@ -90,7 +90,7 @@ impl FileKind {
         }
     }
 
-    /// Its format, if it needs neither a vehicle file nor a mapping.
+    /// Returns the format of this kind, if it needs neither a vehicle file nor a mapping.
     pub fn format(self) -> Option<Box<dyn Format>> {
         match self {
             Self::Tlog => Some(Box::<TlogFormat>::default()),
@@ -101,17 +101,17 @@ impl FileKind {
         }
     }
 
-    /// Whether such files contain values, which emulators turn into bytes.
+    /// Whether files of this kind contain values, which emulators turn into bytes.
     pub fn has_values(self) -> bool {
         matches!(self, Self::Csv | Self::Rosbag | Self::Mcap)
     }
 
-    /// Whether such a file comes from a single device.
+    /// Whether a file of this kind comes from a single device.
     pub(crate) fn has_one_device(self) -> bool {
         matches!(self, Self::Imagenex | Self::Ping)
     }
 
-    /// The plugin of the sensors whose bytes such files contain; empty if they contain values.
+    /// Returns the plugin of the sensors whose bytes such files contain; empty if they contain values.
     pub(crate) fn plugin(self) -> &'static str {
         match self {
             Self::Tlog => headrace_mavlink::MavlinkKind.name(),
@@ -122,7 +122,7 @@ impl FileKind {
         }
     }
 
-    /// The line that a sensor with this connection listens to.
+    /// Returns the name of the line to which a sensor with this `connect` listens.
     pub(crate) fn usual_line(self, connect: &str) -> Option<String> {
         match self {
             Self::Candump => match Connect::parse(connect) {
@@ -133,7 +133,7 @@ impl FileKind {
         }
     }
 
-    /// Form of a line's name.
+    /// Returns the form of a line's name, for messages.
     pub(crate) fn line_form(self) -> &'static str {
         match self {
             Self::Tlog => tlog::STREAM,

@@ -1,18 +1,18 @@
-//! Losses of an import by kind, with counts and first positions.
+//! Losses of an import: for each reason, the count and the first position.
 
 use std::collections::BTreeMap;
 
 use headrace_geometry::time::MonoNs;
 
-/// Losses so far.
+/// Losses of an import so far.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Losses {
     kinds: BTreeMap<&'static str, Kind>,
-    /// End and kind of the last loss. A lost byte that follows directly belongs to the same loss.
+    /// End and reason of the last loss. A single lost byte directly after it belongs to the same loss.
     last: Option<(u64, &'static str)>,
     cut_off: Option<(u64, usize)>,
     late: u64,
-    /// Number of gaps, and length and time of the first one.
+    /// Number of gaps, then length and time of the first gap.
     gaps: Option<(u64, u64, MonoNs)>,
 }
 
@@ -32,23 +32,23 @@ impl Losses {
         self.last = Some((at + bytes as u64, why));
     }
 
-    /// Records that the file ends within an entry.
+    /// Notes that the file ends within an entry.
     pub(super) fn cut_off(&mut self, at: u64, bytes: usize) {
         self.cut_off = Some((at, bytes));
     }
 
-    /// Counts entries dropped because they came too late to be put in order.
+    /// Counts entries dropped because their timestamps came too late in the file to be put in order.
     pub(super) fn late(&mut self, count: u64) {
         self.late = count;
     }
 
-    /// Counts a gap of hours between two timestamps of the file.
+    /// Counts a gap of more than an hour between two timestamps of the file.
     pub(super) fn gap(&mut self, gap_ns: u64, at: MonoNs) {
         let (count, first_ns, first_at) = self.gaps.unwrap_or((0, gap_ns, at));
         self.gaps = Some((count + 1, first_ns, first_at));
     }
 
-    /// All losses, as text.
+    /// Returns all losses as text.
     pub(super) fn words(&self) -> Vec<String> {
         let mut all: Vec<String> = self
             .kinds
@@ -63,7 +63,7 @@ impl Losses {
         }
         if self.late > 0 {
             all.push(format!(
-                "{} entries out of order by more than the reordering buffer holds were left out",
+                "{} entries out of order: they came too late to be sorted, and were left out",
                 self.late
             ));
         }

@@ -1,31 +1,32 @@
-//! Logs of Ping Viewer: after a preface, each message is preceded by its time of day.
+//! Logs of Ping Viewer: a preface, then messages, each after its time of day.
 //!
-//! Source: Ping Viewer, docs, "Binary log file structure": big-endian; a text is its length in bytes, u32, and UTF-16.
+//! Source: Ping Viewer, docs, "Binary log file structure". Numbers are big-endian. A text is its length in bytes,
+//! u32, and UTF-16.
 
 use crate::{Clock, Entry, Format, Step};
 
-/// The format; its one stream is [`STREAM`].
+/// The Ping Viewer format. Its only stream is [`STREAM`].
 #[derive(Debug, Default)]
 pub struct PingFormat {
     begun: bool,
-    /// Number of whole days since the first one.
+    /// Number of midnights passed since the first message.
     days: u64,
     last_of_day_ns: u64,
 }
 
-/// Name of the line with all messages.
+/// Name of the line that carries all messages.
 pub const STREAM: &str = "ping";
 
-/// Number of texts before the two numbers that end the preface; the four-byte version follows the first text.
+/// Number of texts in the preface after the title and the version. Two numbers follow them.
 const TEXTS: usize = 5;
 const TITLE: &str = "PingViewer sensor log file";
 const DAY_NS: u64 = 86_400_000_000_000;
-/// A time earlier by more than this belongs to the next day; one earlier by less is out of order.
+/// A step back in time by more than this means a new day. A smaller step means entries out of order.
 const MIDNIGHT_NS: u64 = DAY_NS / 2;
-/// Upper bound on the length of any text or message of such a log.
+/// Upper bound on the length of a text or message, bytes.
 const MOST_BYTES: usize = 1 << 16;
 
-/// Reason why a field can't be read.
+/// Reason why a field can't be read: more bytes are needed, or it is invalid.
 enum Stop {
     More,
     Bad,
@@ -42,7 +43,7 @@ impl Format for PingFormat {
         match done {
             Ok(()) => Step::Took(front.len() - rest.len()),
             Err(Stop::More) => Step::More,
-            // Records have no sync mark to find the next one by.
+            // Records have no sync mark, so none can be found after damage.
             Err(Stop::Bad) if self.begun => {
                 Step::Lost(front.len(), "no time and message where they are expected")
             }
@@ -86,7 +87,7 @@ fn number(rest: &mut &[u8]) -> Result<u32, Stop> {
 }
 
 fn sized<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Stop> {
-    // Qt's marker of a null string.
+    // Qt writes a null string with this length.
     let len = match number(rest)? {
         u32::MAX => 0,
         len => usize::try_from(len).map_err(|_| Stop::Bad)?,
@@ -105,7 +106,7 @@ fn text(rest: &mut &[u8]) -> Result<String, Stop> {
     String::from_utf16(&units).ok().filter(|_| odd.is_empty()).ok_or(Stop::Bad)
 }
 
-/// `hh:mm:ss.zzz`, optionally followed by a zero.
+/// Parses a time of day, `hh:mm:ss.zzz`, which a zero character may follow.
 fn time_of_day_ns(text: &str) -> Option<u64> {
     let text = text.trim_end_matches('\0');
     let (clock, milliseconds) = text.split_once('.')?;

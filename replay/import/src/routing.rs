@@ -8,42 +8,44 @@ use headrace_vehicle::VehicleConfig;
 use crate::kind::FileKind;
 use crate::taker::Taker;
 
-/// The lines of a file can't be routed to sensors. Messages name the options of `headrace import`.
+/// Reason why the lines of a file can't be assigned to sensors.
+///
+/// Messages name the options of `headrace import`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RoutingError {
     /// An option names a sensor that the vehicle file doesn't have.
     #[error("--source {id}: the vehicle file has no such sensor; allowed are {allowed}")]
     NoSuchSensor {
-        /// Its name.
+        /// Name in the option.
         id: String,
-        /// The ids of existing sensors.
+        /// Ids of the sensors in the vehicle file.
         allowed: String,
     },
-    /// No sensor of the vehicle file can receive such a file's data.
+    /// No sensor of the vehicle file can receive the data of such a file.
     #[error("the vehicle file has no sensor {which} to receive the data; name one with --source ID={line}")]
     NoTaker {
-        /// Sensors that could receive it.
+        /// Description of sensors that could receive the data.
         which: String,
         /// Form of a line's name.
         line: &'static str,
     },
-    /// Several sensors could be the file's only device.
+    /// The file comes from one device, but several sensors could be that device.
     #[error(
         "the file comes from one device, but {several} have plugin {plugin}; choose one with --source ID={line}"
     )]
     SeveralTakers {
-        /// Their names.
+        /// Ids of these sensors.
         several: String,
-        /// Their plugin.
+        /// Plugin of these sensors.
         plugin: &'static str,
-        /// Form of the line's name.
+        /// Form of a line's name.
         line: &'static str,
     },
-    /// A file of values is imported without a vehicle file, whose sensors must encode them.
+    /// The file contains values, and there is no vehicle file with sensors that could encode them.
     #[error("{format} needs --vehicle VEHICLE.toml, whose sensors encode its values")]
     NoVehicle {
-        /// The kind of file.
+        /// Kind of file.
         format: &'static str,
     },
     /// Neither a vehicle file nor an option names a sensor.
@@ -55,28 +57,28 @@ pub enum RoutingError {
     /// An option names lines, but the file contains values.
     #[error("--source isn't for {format}; a mapping file names the sensors")]
     NoLines {
-        /// The kind of file.
+        /// Kind of file.
         format: &'static str,
     },
-    /// An option names a line that the file doesn't have.
+    /// An option names a line that such a file doesn't have.
     #[error("--source {id}={line}: such a file has one line, {only}")]
     NoSuchLine {
-        /// The sensor.
+        /// Sensor named by the option.
         id: String,
-        /// The line.
+        /// Line named by the option.
         line: String,
-        /// The line that it has.
+        /// The only line that such a file has.
         only: &'static str,
     },
-    /// Options name a sensor twice.
+    /// Two options name the same sensor.
     #[error("--source {id}: named twice; a sensor listens to one line")]
     Twice {
-        /// Its name.
+        /// Name of the sensor.
         id: String,
     },
 }
 
-/// The sensors that receive lines: those of the vehicle file, or those of `explicit`.
+/// Returns the sensors that receive lines: those of the vehicle file, or those in `explicit`.
 ///
 /// `explicit` has pairs of a sensor's id and its line, which override the vehicle file's.
 ///
@@ -102,7 +104,7 @@ pub fn takers(
         let is_of_kind = kind == FileKind::Candump || config.plugin == kind.plugin();
         let usual = kind.usual_line(&config.connect).filter(|_| is_of_kind);
         let Some(stream) = own.or(usual.filter(|_| explicit.is_empty())) else { continue };
-        // One line carries the whole telemetry link; each device's driver picks out its own messages.
+        // All devices of a telemetry link share one line, so each device's driver must pick out its own messages.
         let setup = DriverSetup { begun: MonoNs(0), head: None };
         let has_driver = kind == FileKind::Tlog && config.plugin == kind.plugin();
         takers.push(Taker { source, stream, driver: has_driver.then(|| device.driver(&setup)) });
@@ -123,7 +125,7 @@ pub fn takers(
     Ok(takers)
 }
 
-/// The log's sources if there is no vehicle file.
+/// Returns the sources of a log that is imported without a vehicle file.
 pub fn sources(kind: FileKind, explicit: &[(String, String)]) -> Vec<SourceInfo> {
     let source = |(id, _): &(String, String)| SourceInfo {
         id: id.clone(),

@@ -1,19 +1,20 @@
-//! A sensor of the vehicle file as a receiver of a foreign log.
+//! A sensor that receives data from a foreign log.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::driver::{Driver, Wire};
 
 /// Receives the data of one sensor.
 pub struct Taker {
-    /// Number of the log's source.
+    /// Source number of the sensor in the log.
     pub source: u16,
-    /// The line that it receives.
+    /// Name of the line that the sensor receives.
     pub stream: String,
-    /// Picks the sensor's data from a shared line; without a driver, the whole line belongs to the sensor.
+    /// Driver that picks the sensor's data from a shared line. Without a driver, the sensor gets everything on the
+    /// line.
     pub driver: Option<Box<dyn Driver>>,
 }
 
-/// Collects the packets that a driver delivers; output to the device is discarded.
+/// Collects the packets that a driver delivers. Messages to the device are discarded.
 struct Heard(Vec<(MonoNs, Vec<u8>)>);
 
 impl Wire for Heard {
@@ -27,12 +28,12 @@ impl Wire for Heard {
 }
 
 impl Taker {
-    /// Whether it receives that line.
+    /// Whether the sensor receives this line.
     pub(super) fn listens_to(&self, stream: &str) -> bool {
         self.stream == stream
     }
 
-    /// Extracts the sensor's packets from an entry.
+    /// Returns the sensor's packets in an entry.
     pub(super) fn take(&mut self, at: MonoNs, bytes: &[u8]) -> Vec<(MonoNs, Vec<u8>)> {
         let mut heard = Heard(Vec::new());
         match &mut self.driver {

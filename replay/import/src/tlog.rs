@@ -5,20 +5,20 @@ use headrace_mavlink::frame::Frames;
 use headrace_mavlink::tlog::{Tlog, TlogError};
 use headrace_sensor::codec::{Framing as _, Verdict};
 
-/// The format; its one stream is [`STREAM`].
+/// The telemetry format. Its only stream is [`STREAM`].
 #[derive(Debug, Default)]
 pub struct TlogFormat {
-    /// Whether the position of the next entry is unknown.
+    /// Whether the reader has lost the position of the next entry.
     astray: bool,
     last_us: u64,
 }
 
-/// Name of the line with all frames.
+/// Name of the line that carries all frames.
 pub const STREAM: &str = "mavlink";
 
-/// Window for resynchronising: an entry's time must be within a day of the last one's.
+/// Maximum difference between the times of two entries. A larger difference after damage means a false match.
 const DAY_US: u64 = 86_400_000_000;
-/// Times beyond 2106 are invalid, µs.
+/// Latest valid time, in 2106, µs.
 const LATEST_US: u64 = 4_294_967_296_000_000;
 
 impl Format for TlogFormat {
@@ -28,7 +28,8 @@ impl Format for TlogFormat {
 
     fn step(&mut self, front: &[u8], _: bool, out: &mut Vec<Entry>) -> Step {
         let logged = match Tlog::new(front).next() {
-            // Out of sync, an apparently truncated entry is probably not one, but only the end of the file can tell.
+            // After damage an entry that seems truncated is probably not an entry, but only the end of the file shows
+            // that.
             None | Some(Err(TlogError::Short { .. })) => return Step::More,
             Some(Err(_)) => return self.lost(),
             Some(Ok(logged)) => logged,

@@ -1,4 +1,4 @@
-//! Provides a loop as the adviser of a simulated pilot. The recorded dive is later run through the same loop.
+//! Provides a loop that advises a simulated pilot. The recorded dive is later run through the same loop.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::feed::work_off;
@@ -12,10 +12,10 @@ use headrace_sensor::device::Direction;
 use headrace_simulator::{Adviser, Message, PilotAdvice, Scene, SceneError, Simulation};
 use headrace_vehicle::VehicleConfig;
 
-/// Length of a tick.
+/// Length of a tick of the adviser's loop.
 const TICK: DurNs = DurNs(20_000_000);
 
-/// Why a scene can't be simulated.
+/// Reason why a scene can't be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulationError {
     /// The scene is inconsistent.
@@ -26,7 +26,7 @@ pub enum SimulationError {
     Adviser(#[from] PluginError),
 }
 
-/// Simulates a scene, with ground truth if `noting`.
+/// Simulates a scene, with ground truth if `noting` is true.
 ///
 /// A pilot who follows advice gets a loop of his own, armed with the scene's vehicle file.
 ///
@@ -35,9 +35,9 @@ pub fn simulation(scene: &Scene, noting: bool) -> Result<Simulation, SimulationE
     simulation_believing(scene, &scene.vehicle, noting)
 }
 
-/// Simulates a scene like [`simulation`], but arms the pilot's loop with another vehicle file.
+/// Simulates a scene as [`simulation`] does, but arms the pilot's loop with another vehicle file, `believed`.
 ///
-/// The sensors of that file must send the same bytes.
+/// Its sensors must send the same bytes as those of the scene's vehicle file.
 ///
 /// Errors: see [`SimulationError`].
 pub fn simulation_believing(
@@ -54,7 +54,7 @@ pub fn simulation_believing(
 
 struct LoopAdviser {
     dive: Loop,
-    /// Ports by source; `None` where the port is in use elsewhere.
+    /// Ports of the loop by source; `None` if a port is in use elsewhere.
     ports: Vec<Option<Port>>,
     /// End of the current tick.
     until: MonoNs,
@@ -78,7 +78,7 @@ impl LoopAdviser {
     }
 }
 
-/// Advice of the last tick, if any.
+/// Returns the advice of the last tick, if any.
 fn told_by(dive: &Loop) -> Option<PilotAdvice> {
     let last = dive.notices().iter().rev().find_map(|notice| match notice {
         Notice::Advice(entry) => Some(entry),

@@ -1,6 +1,6 @@
-//! Writes files atomically: a file is complete at its path, or the previous file is unchanged.
+//! Writes files atomically: a path has either the complete new file or the unchanged previous file.
 //!
-//! The content is written beside the destination and moved there once it is complete and synced.
+//! The content is written beside the destination, synced, and then moved to the destination.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{BufWriter, Error, ErrorKind, Result, Seek, SeekFrom, Write};
@@ -8,32 +8,32 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-/// How long to wait for a reader of a named pipe.
+/// Time to wait for a reader of a named pipe, and number of attempts in that time.
 const READER_WITHIN: Duration = Duration::from_secs(2);
 const READER_TRIES: u32 = 100;
 
-/// A file that is being written. Dropping it before [`AtomicFile::complete`] leaves the previous file unchanged.
+/// A file being written. If it is dropped before [`AtomicFile::complete`], the previous file is unchanged.
 #[derive(Debug)]
 pub struct AtomicFile {
     file: BufWriter<File>,
-    /// Destination, and where the file is kept until then; `None` if the file is written in place.
+    /// Destination, and where the file is until it is complete; `None` if it is written in place.
     beside: Option<(PathBuf, Beside)>,
 }
 
-/// How a file is kept beside its destination.
+/// How an incomplete file is stored beside its destination.
 #[derive(Debug)]
 enum Beside {
     /// Under a temporary name.
     Named(PathBuf),
-    /// Without a name, so that nothing is left behind however the program ends.
+    /// Without a name, so that nothing is left behind even if the program is killed.
     Nameless,
 }
 
 impl AtomicFile {
-    /// Begins a file at `path`, or at the target of a link there.
+    /// Begins a file at `path`. If `path` is a link, begins a file at its target.
     ///
-    /// Pipes, terminals, devices, and files in a folder that accepts no new file can't be replaced; they are written in
-    /// place.
+    /// Pipes, terminals and devices can't be replaced, nor can files in a folder that accepts no new file. All these
+    /// are written in place.
     ///
     /// Errors: those of the system.
     pub fn create(path: &Path) -> Result<Self> {
@@ -59,7 +59,7 @@ impl AtomicFile {
         Ok(Self { file: BufWriter::new(file), beside: None })
     }
 
-    /// Moves the file to its destination. Once this returns, the file survives a power cut.
+    /// Moves the file to its destination. Once this function returns, the file survives a power cut.
     ///
     /// Errors: those of the system; the previous file is then unchanged.
     pub fn complete(mut self) -> Result<()> {
@@ -67,7 +67,7 @@ impl AtomicFile {
         let Some((place, beside)) = &mut self.beside else { return Ok(()) };
         self.file.get_ref().sync_all()?;
         if matches!(beside, Beside::Nameless) {
-            // A file without a name can't replace another atomically.
+            // Only a file with a name can replace another file atomically.
             let name = name_beside(place);
             give_name(self.file.get_ref(), &name)?;
             *beside = Beside::Named(name);
@@ -77,7 +77,7 @@ impl AtomicFile {
         }
         let folder = folder_of(place).to_owned();
         self.beside = None;
-        // Folders can't be opened on other systems, and not every file system can sync them.
+        // Other systems can't open folders, and some file systems can't sync them.
         if cfg!(unix) {
             File::open(folder).and_then(|folder| folder.sync_all()).ok();
         }
@@ -119,7 +119,7 @@ impl Drop for AtomicFile {
     }
 }
 
-/// Whether a path is a named pipe. Opening one blocks until a process reads it.
+/// Whether a path is a named pipe. Opening a pipe blocks until a process reads it.
 #[cfg(unix)]
 pub fn is_pipe(path: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt as _;
@@ -132,9 +132,9 @@ pub fn is_pipe(_: &Path) -> bool {
     false
 }
 
-/// Opens a named pipe for writing once a process reads it.
+/// Opens a named pipe for writing, once a process reads it.
 ///
-/// Errors: those of the system; or no process reads it within [`READER_WITHIN`].
+/// Errors: those of the system; no process reads the pipe within [`READER_WITHIN`].
 #[cfg(unix)]
 fn open_pipe(path: &Path) -> Result<File> {
     use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
@@ -143,7 +143,7 @@ fn open_pipe(path: &Path) -> Result<File> {
     loop {
         match open(path, OFlags::WRONLY | OFlags::NONBLOCK | OFlags::CLOEXEC, Mode::empty()) {
             Ok(pipe) => {
-                // Writes block from here on, so that a slow reader gets everything.
+                // From here on writes block, so that a slow reader gets everything.
                 fcntl_setfl(&pipe, OFlags::empty())?;
                 return Ok(pipe.into());
             }
@@ -167,7 +167,7 @@ fn open_pipe(path: &Path) -> Result<File> {
     File::create(path)
 }
 
-/// Begins a file beside its destination, without a name where the system supports it.
+/// Creates a file beside its destination, without a name if the system supports that.
 fn beside(place: &Path) -> Result<(File, Beside)> {
     if let Some(file) = nameless(folder_of(place)) {
         return Ok((file, Beside::Nameless));
@@ -176,9 +176,9 @@ fn beside(place: &Path) -> Result<(File, Beside)> {
     Ok((OpenOptions::new().write(true).create_new(true).open(&name)?, Beside::Named(name)))
 }
 
-/// Creates an unlinked file that can be given a name later.
+/// Creates an unlinked file, which can get a name later.
 ///
-/// `None` if the file system, the kernel or a missing `/proc` doesn't allow it.
+/// Returns `None` if the file system, the kernel or a missing `/proc` prevents it.
 #[cfg(target_os = "linux")]
 fn nameless(folder: &Path) -> Option<File> {
     use rustix::fs::{CWD, Mode, OFlags, openat};
@@ -187,7 +187,7 @@ fn nameless(folder: &Path) -> Option<File> {
     path_of(&file).exists().then_some(file)
 }
 
-/// Creates an unlinked file; `None` on this system.
+/// Creates an unlinked file; always `None` on this system.
 #[cfg(not(target_os = "linux"))]
 fn nameless(_: &Path) -> Option<File> {
     None
@@ -206,32 +206,32 @@ fn give_name(_: &File, _: &Path) -> Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
-/// Path of an open file among the process's file descriptors.
+/// Returns the path of an open file in the process's list of file descriptors.
 #[cfg(target_os = "linux")]
 fn path_of(file: &File) -> PathBuf {
     use std::os::fd::AsRawFd as _;
     format!("/proc/self/fd/{}", file.as_raw_fd()).into()
 }
 
-/// The folder that a file is in.
+/// Returns the folder of a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Identity of a file: device number and inode number; `None` where the system has none.
+/// Returns the device and inode number of a file; `None` if the system has no such numbers.
 #[cfg(unix)]
 pub fn number_of(file: &Metadata) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt as _;
     Some((file.dev(), file.ino()))
 }
 
-/// Identity of a file: device number and inode number; `None` on this system.
+/// Returns the device and inode number of a file; always `None` on this system.
 #[cfg(not(unix))]
 pub fn number_of(_: &Metadata) -> Option<(u64, u64)> {
     None
 }
 
-/// A temporary name beside a file. Readers of log folders ignore it.
+/// Returns a temporary name beside a file. Readers of log folders ignore such names.
 fn name_beside(place: &Path) -> PathBuf {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let mut name = place.file_name().unwrap_or_default().to_owned();
@@ -240,7 +240,7 @@ fn name_beside(place: &Path) -> PathBuf {
     place.with_file_name(name)
 }
 
-/// Whether an error means that a folder accepts no new file, although an existing file may still be writable.
+/// Whether an error means that the folder accepts no new file. An existing file there may still be writable.
 fn is_refused(kind: ErrorKind) -> bool {
     use ErrorKind::{InvalidFilename, PermissionDenied, ReadOnlyFilesystem};
     matches!(kind, InvalidFilename | PermissionDenied | ReadOnlyFilesystem)
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn previous_file_remains_until_the_new_one_is_complete() {
+    fn previous_file_is_unchanged_until_the_new_file_is_complete() {
         let folder = folder("stays");
         let path = folder.join("report.json");
         write(&path, b"old").unwrap();
@@ -273,7 +273,7 @@ mod tests {
         file.write_all(b"new").unwrap();
         file.flush().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
-        // With an unlinked file, a killed program leaves nothing behind.
+        // A killed program leaves nothing behind if the new file is unlinked.
         if nameless(&folder).is_some() {
             assert_eq!(names(&folder), ["report.json"]);
         }
@@ -292,7 +292,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_permissions_are_kept_and_devices_written_in_place() {
+    fn links_and_permissions_are_kept_and_devices_are_written_in_place() {
         use std::os::unix::fs::{PermissionsExt as _, symlink};
         let folder = folder("links");
         let (path, link) = (folder.join("real.json"), folder.join("link.json"));
@@ -309,14 +309,14 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn pipes_are_written_whole_to_a_reader_and_refused_without_one() {
+    fn pipes_are_written_to_a_slow_reader_and_refused_without_a_reader() {
         use rustix::fs::{CWD, FileType, Mode, mknodat};
         let folder = folder("pipe");
         let pipe = folder.join("pipe");
         mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
         let error = write(&pipe, b"new").unwrap_err();
         assert_eq!(error.to_string(), "it is a pipe that no process has read within 2 s");
-        // The content exceeds a pipe's capacity, and the reader starts late and reads slowly.
+        // The content is larger than a pipe's capacity. The reader starts late and reads slowly.
         let content: Vec<u8> = (0..=255).cycle().take(200_000).collect();
         let read = {
             let pipe = pipe.clone();

@@ -1,6 +1,6 @@
-//! Logs whose messages are stamped by several clocks, e.g. time since boot and UNIX time.
+//! Handles logs whose messages have timestamps from several clocks, e.g. time since boot and UNIX time.
 //!
-//! Such timestamps have no common order. The messages of the clock with the most messages are played; the others are
+//! Such timestamps have no common order. Only messages of the clock with the most messages are played. The others are
 //! dropped and reported.
 
 use std::path::PathBuf;
@@ -9,12 +9,12 @@ use headrace_geometry::time::MonoNs;
 
 use crate::log::{DiveLog, LogError, MessageKind};
 
-/// Smallest offset between two clocks: no dive lasts this long.
+/// Minimum offset between two clocks, far longer than any dive.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Maximum number of clocks that are distinguished; messages of further clocks are assigned to none.
+/// Maximum number of clocks that are distinguished. Messages of further clocks are assigned to no clock.
 const MAX_CLOCKS: usize = 100;
 
-/// A clock, described by the range of its timestamps. It is more than a year from every other clock's range.
+/// A clock, described by the range of its timestamps. The ranges of two clocks are more than a year apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Clock {
     from: MonoNs,
@@ -23,12 +23,12 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Whether a timestamp may come from this clock.
+    /// Whether a timestamp may be from this clock.
     pub(crate) fn is_of(&self, at: MonoNs) -> bool {
         (self.from.0.saturating_sub(YEAR_NS)..=self.to.0.saturating_add(YEAR_NS)).contains(&at.0)
     }
 
-    /// Offset of another clock's timestamp from this one's, as text.
+    /// Returns the offset of another clock's timestamp from this clock's range, as text.
     pub(crate) fn distance(&self, at: MonoNs) -> String {
         let (ns, side) = if at < self.from {
             (self.from.0.saturating_sub(at.0), "before")
@@ -39,7 +39,7 @@ impl Clock {
     }
 }
 
-/// The clock with the most source messages; `None` if the log has only one clock.
+/// Returns the clock with the most source messages; `None` if the log has only one clock.
 ///
 /// The messages are read only if the chunk headers span more than a year.
 ///
@@ -57,12 +57,12 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
         }
     }
     let several = clocks.len() > 1 || others > 0;
-    // At equal counts the earlier clock: a monotonic clock starts at zero.
+    // If two counts are equal, the earlier clock wins, because a monotonic clock starts at zero.
     let most = clocks.into_iter().min_by_key(|clock| (core::cmp::Reverse(clock.messages), clock.from));
     Ok(most.filter(|_| several))
 }
 
-/// Counts a message for its clock; `false` if there are too many clocks.
+/// Counts a message for its clock. Returns `false` if there are too many clocks.
 fn count(clocks: &mut Vec<Clock>, at: MonoNs) -> bool {
     if let Some(clock) = clocks.iter_mut().find(|clock| clock.is_of(at)) {
         (clock.from, clock.to) = (clock.from.min(at), clock.to.max(at));
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_years_apart_belong_to_different_clocks() {
+    fn timestamps_years_apart_belong_to_different_clocks() {
         let mut clocks = Vec::new();
         for at in [5, YEAR_NS * 50, 7, YEAR_NS * 50 + 9, YEAR_NS / 2, YEAR_NS * 4] {
             count(&mut clocks, MonoNs(at));
@@ -95,7 +95,7 @@ mod tests {
             count(&mut clocks, MonoNs(at * 3 * YEAR_NS));
         }
         assert_eq!(clocks.len(), MAX_CLOCKS);
-        // A clock beyond the limit doesn't extend the range of another.
+        // A timestamp beyond the limit of clocks doesn't extend the range of another clock.
         assert!(!count(&mut clocks, MonoNs(YEAR_NS * 580)) && count(&mut clocks, MonoNs(8)));
         assert!(clocks.iter().all(|clock| clock.to.0 - clock.from.0 <= YEAR_NS));
     }

@@ -1,4 +1,4 @@
-//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, as the port threads would.
+//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, as the port threads would do.
 
 use std::time::{Duration, Instant};
 
@@ -10,41 +10,41 @@ use headrace_sensor::reading::SourceId;
 
 use crate::log::LogError;
 
-/// The next packet of a feed.
+/// Description of a feed's next packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coming {
     /// Time of receipt.
     pub at: MonoNs,
-    /// Number of the source in the loop.
+    /// Source number in the loop.
     pub source: SourceId,
     /// Length, bytes.
     pub len: usize,
 }
 
-/// Source of packets when no port is open.
+/// A source of packets in place of open ports.
 pub trait PacketSource {
-    /// The next packet, or `None` at the end.
+    /// Returns the next packet; `None` at the end.
     ///
     /// Errors: reading the log fails.
     fn coming(&mut self) -> Result<Option<Coming>, LogError>;
 
-    /// First and last time of the packets, where known.
+    /// Returns the first and last time of the packets, if known.
     fn span(&self) -> Option<(MonoNs, MonoNs)> {
         None
     }
 
-    /// Puts the next packet into the ring of its source.
+    /// Sends the next packet to the ring of its source.
     ///
-    /// Errors: the packet doesn't fit; it remains the next packet.
+    /// Errors: the packet doesn't fit, and remains the next packet.
     fn send(&mut self, port: &mut Port) -> Result<(), RingError>;
 }
 
 /// Tick length and playback speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    /// Length of a tick in packet time, positive.
+    /// Length of a tick in packet time; must be positive.
     pub tick: DurNs,
-    /// Seconds of packet time per second of wall time; `None` runs as fast as possible.
+    /// Seconds of packet time per second of wall time; `None` is as fast as possible.
     pub speed: Option<f64>,
 }
 
@@ -55,7 +55,7 @@ impl Default for Pace {
     }
 }
 
-/// Why a drive stopped early.
+/// Reason why a drive stopped early.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriveError {
@@ -65,19 +65,19 @@ pub enum DriveError {
     /// A port of the loop is in use elsewhere.
     #[error("driving the loop: the port of source {source_id:?} has been taken already")]
     PortTaken {
-        /// The source.
+        /// Id of the source.
         source_id: String,
     },
-    /// The loops differ in more than their sections, and therefore can't share one navigation.
+    /// The loops differ in more than their sections, so they can't share one navigation.
     #[error(
         "driving several loops with one navigation: loop {number}, counted from 0, has other sensors, another tunnel or layout than \
          loop 0, or systems of its own that place pings"
     )]
     Unlike {
-        /// Number of the loop.
+        /// Number of the loop that differs, counted from 0.
         number: usize,
     },
-    /// A thread of the replay has panicked: a bug. The loop must not be used afterwards.
+    /// A thread of the replay has panicked, which is a bug. The loop must not be used afterwards.
     #[error("driving the loop: the thread that {what} has panicked: {message}; please report it")]
     Panicked {
         /// Task of the thread.
@@ -100,7 +100,7 @@ pub fn drive(
     feed::drive(dive, &mut PacedFeed { driver, source, pace, clock: None }, after_tick)
 }
 
-/// A packet source at a pace, as the feed of a loop.
+/// A packet source with a pace, as the feed of a loop.
 struct PacedFeed<'a> {
     driver: Driver,
     source: &'a mut dyn PacketSource,
@@ -131,7 +131,7 @@ impl Feed for PacedFeed<'_> {
     }
 }
 
-/// Waits briefly so that a slow outlet can catch up.
+/// Waits briefly, so that a slow outlet can catch up.
 pub(crate) fn pause() {
     std::thread::sleep(Duration::from_millis(1));
 }
@@ -152,8 +152,9 @@ impl Driver {
         Ok(Self { ports: take_ports(dive)?, tick, until: None })
     }
 
-    /// End of the next tick; `None` at the end of the feed. After a gap in the feed the tick ends just after the next
-    /// packet.
+    /// Returns the end of the next tick; `None` at the end of the feed.
+    ///
+    /// After a gap in the feed, the tick ends just after the next packet.
     ///
     /// Errors: reading the feed fails.
     pub fn due(&self, feed: &mut dyn PacketSource) -> Result<Option<MonoNs>, DriveError> {
@@ -162,7 +163,7 @@ impl Driver {
         Ok(Some(begun.map_or(next.at + self.tick, |until| until.max(next.at + DurNs(1)))))
     }
 
-    /// Feeds packets up to the end of the next tick, then runs it.
+    /// Feeds packets up to the end of the next tick, and runs the tick.
     ///
     /// Errors: see [`DriveError`]. Packets fed before the error have been processed.
     pub fn tick(
@@ -178,8 +179,9 @@ impl Driver {
         Ok(())
     }
 
-    /// Feeds packets received before `until`; `work_off` runs a tick. On an error the packets fed so far have been
-    /// processed.
+    /// Feeds packets received before `until`. `work_off` runs a tick.
+    ///
+    /// After an error, the packets fed so far have been processed.
     pub(crate) fn fill(
         &mut self,
         feed: &mut dyn PacketSource,
@@ -194,13 +196,13 @@ impl Driver {
         sent
     }
 
-    /// Continues at `until` after feed and loop have both jumped there.
+    /// Continues at `until`, after both the feed and the loop have jumped there.
     pub fn jump_to(&mut self, until: MonoNs) {
         self.until = Some(until);
     }
 }
 
-/// Takes the ports of the sensors, and that of the operator's input unless an operator is connected.
+/// Takes the ports of all sensors. Also takes the port of the operator's input, unless an operator is connected.
 fn take_ports(dive: &mut Loop) -> Result<Vec<Port>, DriveError> {
     let ids: Vec<String> = dive.sources().iter().map(|source| source.id.clone()).collect();
     let sensors = ids.into_iter().enumerate();
@@ -211,19 +213,19 @@ fn take_ports(dive: &mut Loop) -> Result<Vec<Port>, DriveError> {
     Ok(ports)
 }
 
-/// Sends packets received before `until`.
+/// Sends all packets received before `until`. Runs a tick whenever a ring is full.
 fn send_until(
     feed: &mut dyn PacketSource,
     ports: &mut [Port],
     until: MonoNs,
     work_off: &mut dyn FnMut(MonoNs),
 ) -> Result<(), DriveError> {
-    // A packet stamped with the clock's last value belongs to the last tick, since nothing can follow it.
+    // No packet can follow the clock's last value, so a packet with that timestamp belongs to the last tick.
     let is_due = |coming: &Coming| coming.at < until || until == MonoNs(u64::MAX);
     while let Some(coming) = feed.coming()?.filter(is_due) {
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };
         if !port.has_room(coming.len) {
-            // Results don't depend on where ticks end, so a full ring may end one.
+            // A full ring ends the tick early. Results don't depend on where ticks end.
             work_off(coming.at);
         }
         if let Err(error) = feed.send(port) {
@@ -233,20 +235,22 @@ fn send_until(
     Ok(())
 }
 
-/// Relates packet time to wall time.
+/// Maps packet time to wall time.
 pub(crate) struct Clock {
     origin: MonoNs,
     paced: Option<(Instant, f64)>,
 }
 
 impl Clock {
-    /// Packet time is `origin` now and advances `speed` seconds per second of wall time; `None` never waits.
+    /// Starts the clock: packet time is now `origin`, and advances by `speed` seconds per second of wall time.
+    ///
+    /// With `None` for `speed` nothing waits.
     #[expect(clippy::disallowed_methods, reason = "pacing is for people who watch; no result depends on it")]
     pub(crate) fn start(origin: MonoNs, speed: Option<f64>) -> Self {
         Self { origin, paced: speed.map(|speed| (Instant::now(), speed)) }
     }
 
-    /// Wall time left until `until` in packet time; `None` when it has passed.
+    /// Returns the wall time that is left until packet time reaches `until`; `None` if it has been reached.
     pub(crate) fn left(&self, until: MonoNs) -> Option<Duration> {
         let (started, speed) = self.paced?;
         let wanted = Duration::try_from_secs_f64(until.since(self.origin).as_secs_f64() / speed).ok()?;

@@ -1,7 +1,7 @@
-//! Measures for each effect of a scene its computing cost, and the change in the loop's results if it is left out.
+//! Measures two quantities for each effect of a scene: its computing cost, and its influence on the loop's results.
 //!
-//! The same dives are simulated with and without an effect, seed by seed. Each effect draws from its own random
-//! numbers, so the two dives of a seed differ only by the effect. The mean difference over seeds has a 95 % confidence
+//! The same dives are simulated with and without the effect, seed by seed. Each effect draws its own random numbers,
+//! so the two dives of a seed differ only by the effect. The mean difference over the seeds has a 95 % confidence
 //! interval by Student's t.
 
 mod error;
@@ -15,21 +15,21 @@ pub use error::EffectInfluenceError;
 use figures::Figures;
 pub use mean::Mean;
 
-/// Largest change of D, m, that counts as negligible; the whole confidence interval must be within it.
+/// Maximum change of D, m, that counts as negligible. The whole confidence interval must be within it.
 pub const HOLE_LIMIT_M: f64 = 0.01;
-/// Largest change of the passed length that counts as negligible, as a share of the coverage extent.
+/// Maximum change of the passed length that counts as negligible, as a share of the coverage extent.
 pub const PASSED_LIMIT: f64 = 0.01;
 
 /// Result of leaving effects out of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
-    /// The effects left out.
+    /// Names of the effects left out.
     pub effects: Vec<&'static str>,
-    /// Their cost, ns of processor time per sonar return.
+    /// Cost of these effects, ns of processor time per sonar return.
     pub price_ns: Mean,
-    /// D without them minus D with them, mean over the sections, m.
+    /// Change of D if the effects are left out, mean over the sections, m.
     pub hole_m: Mean,
-    /// Metres passed without them minus metres passed with them, as a share of the coverage extent.
+    /// Change of the passed length if the effects are left out, as a share of the coverage extent.
     pub passed: Mean,
 }
 
@@ -38,33 +38,35 @@ pub struct LeftOut {
 pub struct EffectInfluence {
     /// Number of seeds.
     pub seeds: usize,
-    /// Length of the tunnel that was judged, m.
+    /// Length of tunnel that was judged, m.
     pub way_m: f64,
-    /// Metres passed with all effects, as a share of the coverage extent.
+    /// Passed length with all effects, as a share of the coverage extent.
     pub passed: Mean,
     /// D with all effects, mean over the sections, m.
     pub hole_m: Mean,
-    /// Cost of the simulation with all effects, ns per sonar return.
+    /// Cost of simulating with all effects, ns of processor time per sonar return.
     pub all_ns: Mean,
-    /// Each effect left out alone, the most expensive first.
+    /// Each effect left out alone, the most expensive effect first.
     pub each: Vec<LeftOut>,
-    /// All effects that can be left out together without a change beyond the limits.
+    /// The effects that can all be left out together, because the change stays within the limits.
     pub spared: LeftOut,
 }
 
 impl LeftOut {
-    /// Whether leaving them out certainly changes nothing by more than [`HOLE_LIMIT_M`] and [`PASSED_LIMIT`].
+    /// Whether leaving out these effects changes nothing by more than [`HOLE_LIMIT_M`] and [`PASSED_LIMIT`].
+    ///
+    /// The whole confidence intervals must be within the limits.
     pub fn is_free(&self) -> bool {
         self.excess() <= 1.0
     }
 
-    /// Largest change within the confidence intervals, in units of the limits.
+    /// Returns the largest change within the confidence intervals, in units of the limits.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }
 }
 
-/// Measures the effects of a scene, which has been read once per seed.
+/// Measures the effects of a scene, which must be given once per seed.
 ///
 /// `note` is called with the number of finished dives and the maximum number of dives.
 ///
@@ -77,7 +79,8 @@ pub fn measure(
         return Err(EffectInfluenceError::Seeds(scenes.len()));
     }
     let effects = scenes.first().map(Scene::simulated).unwrap_or_default();
-    // Leaving out all negligible effects takes one measurement, and one more for each that must be restored.
+    // Leaving out all negligible effects together takes one measurement. Each effect that must be restored takes one
+    // more.
     let most = scenes.len() * (2 * effects.len() + 2);
     let mut paired = Paired { with: Vec::new(), scenes, dived: 0, most, note };
     paired.with = paired.dive(&[])?;
@@ -99,12 +102,12 @@ pub fn measure(
     })
 }
 
-/// The scene used to measure the cost.
+/// Returns the scene on which the cost is measured.
 fn first(scenes: &mut [Scene]) -> Result<&mut Scene, EffectInfluenceError> {
     scenes.first_mut().ok_or(EffectInfluenceError::Seeds(0))
 }
 
-/// The same dives with and without effects.
+/// Simulates the same dives with and without effects.
 struct Paired<'a> {
     scenes: &'a mut [Scene],
     /// Results with all effects, seed by seed.
@@ -142,8 +145,9 @@ impl Paired<'_> {
         })
     }
 
-    /// Leaves out all effects that are negligible alone. If their joint change exceeds the limits, restores the one
-    /// with the largest change and repeats.
+    /// Leaves out all effects that are negligible alone.
+    ///
+    /// If their joint change exceeds the limits, restores the effect with the largest change, and measures again.
     fn spared(&mut self, each: &[LeftOut]) -> Result<LeftOut, EffectInfluenceError> {
         let mut free: Vec<&LeftOut> = each.iter().filter(|alone| alone.is_free()).collect();
         free.sort_by(|a, b| a.excess().total_cmp(&b.excess()));

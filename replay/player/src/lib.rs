@@ -1,7 +1,7 @@
 //! Recording, reading and replaying dive logs.
 //!
-//! Contains the recorder and the log reader, the driver that feeds a loop from a log or a simulation, playback, and
-//! verification, smoothing and viewer output of a recorded dive.
+//! Contains the recorder, the log reader, the driver that feeds a loop from a log or a simulation, and playback. Also
+//! contains verification, smoothing and viewer output for a recorded dive.
 
 mod adviser;
 pub mod atomic_file;

@@ -14,21 +14,21 @@ use crate::log::voice::decode;
 use crate::log::{DiveLog, LogError, LogMessage, MessageKind};
 use crate::results::{read_results, stream_of};
 
-/// The notes and voice notes in a log.
+/// The notes in a log, including voice notes.
 #[derive(Debug, Default)]
 pub struct LoggedNotes {
-    /// The notes, numbered as in a replay. Their chainages come from the dive's results; a log without results has
-    /// none.
+    /// The notes, numbered as in a replay. Their chainages come from the log's results, and are missing without
+    /// results.
     pub notes: Vec<NoteJson>,
-    /// Seconds, container and bytes of the recordings, by id.
+    /// Recordings of voice notes by id: seconds, container, and length in bytes.
     pub voices: BTreeMap<u32, (u32, Container, usize)>,
-    /// For each voice message that can't be decoded, its error.
+    /// Error of each voice message that can't be decoded.
     pub wrong: Vec<String>,
     /// Losses of the log, as text.
     pub losses: Vec<String>,
 }
 
-/// Reads the notes of a log.
+/// Reads the notes in a log.
 ///
 /// Errors: the log can't be read.
 pub fn notes_of(files: &[PathBuf]) -> Result<LoggedNotes, LogError> {
@@ -56,7 +56,7 @@ pub fn notes_of(files: &[PathBuf]) -> Result<LoggedNotes, LogError> {
     Ok(found)
 }
 
-/// Passes every voice recording in a log to `take`, in order.
+/// Passes each voice recording in a log to `take`, in order.
 ///
 /// Errors: the log can't be read; errors of `take`.
 pub fn each_voice<E: From<LogError>>(
@@ -75,7 +75,7 @@ pub fn each_voice<E: From<LogError>>(
 }
 
 impl LoggedNotes {
-    /// Processes a command of the operator.
+    /// Processes a message of the operator's input.
     fn hear(&mut self, message: &LogMessage<'_>) {
         let (by, text, voice) = match Command::parse(message.data) {
             Ok(Command::Note { text, by }) => (by, text.as_str().to_owned(), None),
@@ -122,7 +122,7 @@ fn place(message: &[u8], places: &mut BTreeMap<u32, f64>) {
         if let (Some(RecordKind::Note | RecordKind::Voice), [_, number, chainage, ..]) =
             (record.kind, record.words)
         {
-            // 0 means that the chainage is unknown.
+            // Chainage 0 means that the chainage was unknown.
             let chainage_m = Some(f64::from_bits(*chainage)).filter(|chainage_m| *chainage_m != 0.0);
             if let (Ok(number), Some(chainage_m)) = (u32::try_from(*number), chainage_m) {
                 places.insert(number, chainage_m);

@@ -13,10 +13,10 @@ use crate::log::LogError;
 use crate::player::Player;
 use crate::snapshot_store::SnapshotStore;
 
-/// Names of the two parts of a snapshot: the player's place in the log, and the loop's state.
+/// Name of a snapshot's first part, the player's position in the log. The loop's state follows it.
 const PLACE_PART: &str = "place in the log";
 
-/// A command to playback; commands are executed in order.
+/// A command to playback. Commands are executed in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PlaybackCommand {
     /// Pauses between two ticks.
@@ -27,17 +27,17 @@ pub enum PlaybackCommand {
     Step(u32),
     /// Plays until a section is judged, then pauses.
     StepSection,
-    /// Sets the speed: seconds of the dive per second of wall time, or `None` for as fast as possible.
+    /// Sets the speed: seconds of the dive per second of wall time; `None` is as fast as possible.
     Speed(Option<f64>),
-    /// Jumps to a time on the log's clock, forward or back, and stays playing or paused.
+    /// Jumps to a time on the log's clock, forward or back. Playback stays playing or paused.
     Seek(MonoNs),
-    /// Jumps by a duration, back if negative.
+    /// Jumps by a duration, which is negative for a jump back.
     Skip(DurNs),
     /// Ends playback at the current tick.
     End,
 }
 
-/// Why playback failed.
+/// Reason why playback failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaybackError {
@@ -52,15 +52,17 @@ pub enum PlaybackError {
     Snapshot(#[from] SnapshotError),
 }
 
-/// Shows playback to its user.
+/// Receives what happens during playback, for display.
 pub trait PlaybackObserver {
     /// Called after each tick that is played.
     fn after_tick(&mut self, dive: &Loop);
 
-    /// Called after a tick that a jump skips; its notices aren't shown.
+    /// Called after each tick that a jump skips. Its notices must not be displayed.
     fn after_skipped_tick(&mut self, dive: &Loop);
 
-    /// Called when paused, after a jump, or with `ended` at the end of the log; `at` is the end of the last tick.
+    /// Called when playback pauses, after a jump, and at the end of the log, then with `ended`.
+    ///
+    /// `at` is the end of the last tick.
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool);
 
     /// Called when playback pauses or resumes, and when its speed changes.
@@ -75,12 +77,12 @@ pub struct Playback<'a> {
     driver: Driver,
     clock: Clock,
     speed: Option<f64>,
-    /// The end of the last tick.
+    /// End of the last tick.
     now: MonoNs,
-    /// The log's first time.
+    /// First time of the log.
     begun: MonoNs,
     mode: Mode,
-    /// Wall time spent in ticks since the last snapshot.
+    /// Wall time spent on ticks since the last snapshot.
     worked: Duration,
 }
 
@@ -88,17 +90,17 @@ pub struct Playback<'a> {
 enum Mode {
     Playing,
     Paused,
-    /// Ticks left to run before it pauses.
+    /// Number of ticks to run before playback pauses.
     Stepping(u32),
     /// Plays until a section is judged.
     SteppingSection,
 }
 
 impl<'a> Playback<'a> {
-    /// Creates a playback that starts at the beginning of the log; the player is already connected to the loop.
+    /// Creates a playback that starts at the beginning of the log. The player must already be connected to the loop.
     ///
-    /// A snapshot is stored whenever its interval of work has passed since the last one. No jump therefore takes much
-    /// longer than that interval.
+    /// A snapshot is taken whenever the work since the last one exceeds an interval. A jump therefore never takes
+    /// much longer than that interval.
     ///
     /// Errors: the log can't be read, or the first snapshot can't be taken.
     pub fn new(
@@ -126,7 +128,7 @@ impl<'a> Playback<'a> {
         Ok(playback)
     }
 
-    /// The log's first time.
+    /// Returns the first time of the log.
     pub fn begun(&self) -> MonoNs {
         self.begun
     }
@@ -143,7 +145,7 @@ impl<'a> Playback<'a> {
             let due = self.driver.due(self.player)?;
             let command = match due {
                 None => {
-                    // Steps left over at the end are discarded, so that a jump back doesn't run them.
+                    // Steps that are left over at the end are discarded, so that a later jump back doesn't run them.
                     if let Mode::Stepping(_) | Mode::SteppingSection = self.mode {
                         self.mode = Mode::Paused;
                     }
@@ -164,11 +166,11 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Waits until a tick is due or, if paused, for a command. Returns a command that arrives earlier.
+    /// Waits until the next tick is due or, if paused, for a command. Returns a command that arrives before.
     fn wait(&mut self, until: MonoNs, commands: &Receiver<PlaybackCommand>) -> Option<PlaybackCommand> {
         match self.mode {
             Mode::Paused => {
-                // With the command channel closed, it plays to the end.
+                // If the command channel is closed, playback continues to the end.
                 let command = commands.recv().ok();
                 if command.is_none() {
                     (self.mode, self.clock) = (Mode::Playing, Clock::start(self.now, self.speed));
@@ -176,7 +178,7 @@ impl<'a> Playback<'a> {
                 command
             }
             Mode::Stepping(_) => None,
-            // The next judged section may be far away, so commands are checked without waiting.
+            // The next judged section may be far away, so a command may arrive before. It is checked without waiting.
             Mode::SteppingSection => commands.try_recv().ok(),
             Mode::Playing => match self.clock.left(until) {
                 None => commands.try_recv().ok(),
@@ -239,7 +241,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Restores a snapshot at a time returned by the store.
+    /// Restores the snapshot of a time that the store has returned.
     fn restore(&mut self, at: MonoNs) -> Result<(), PlaybackError> {
         let Some(snapshot) = self.store.load(at) else { return Ok(()) };
         let mut restorer = Restorer::new(&snapshot);
@@ -276,7 +278,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Jumps to the last tick that ends at or before `to`, from here or from the nearest earlier snapshot.
+    /// Jumps to the last tick that ends at or before `to`. Starts from here, or from the nearest earlier snapshot.
     ///
     /// Errors: see [`PlaybackError`].
     pub fn seek(&mut self, to: MonoNs, observer: &mut dyn PlaybackObserver) -> Result<(), PlaybackError> {

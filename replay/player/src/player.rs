@@ -14,32 +14,32 @@ use crate::clocks::{self, Clock};
 use crate::drive::{Coming, PacketSource};
 use crate::log::{DiveLog, DivePlace, LogError, LogInfo, Loss, MessageKind, PartFile};
 
-/// Plays the source messages of a log.
+/// Plays the messages of a log that were received from sources.
 pub struct Player {
     reader: DiveLog,
-    /// For each source of the log, the loop's source with that name.
+    /// For each source of the log, the loop's source of the same name.
     sources: Vec<Option<SourceId>>,
     ids: Vec<String>,
     next: Option<Coming>,
     bytes: Vec<u8>,
     order: u64,
     played: u64,
-    /// Number of messages by source id, for sources that the vehicle file doesn't have.
+    /// Number of messages by source id, for sources that are missing from the vehicle file.
     unmatched: BTreeMap<String, u64>,
     too_long: u64,
     /// The clock with the most messages, if the log has several clocks.
     clock: Option<Clock>,
-    /// Messages stamped by another clock, by source id: count and first timestamp.
+    /// Messages with timestamps of another clock, by source id: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
-    /// The farthest place from which a jump started, in messages, and the losses up to there.
+    /// The farthest position from which a jump started, as a message count, and the losses up to there.
     farthest: (u64, Vec<String>),
 }
 
-/// A player's position in its log, to resume from.
+/// A player's position in its log, from which playing can be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlayerPlace {
     pub(crate) log: DivePlace,
-    /// The message read but not sent yet: receive time, source, bytes.
+    /// A message that was read but not sent yet: receive time, source, bytes.
     next: Option<(MonoNs, u16, Vec<u8>)>,
     order: u64,
     played: u64,
@@ -71,14 +71,14 @@ impl Player {
         })
     }
 
-    /// The log's header.
+    /// Returns the log's header.
     pub fn info(&self) -> &LogInfo {
         self.reader.header()
     }
 
-    /// Matches the log's sources with the loop's by name; the operator's input comes after the sensors.
+    /// Maps the log's sources to the loop's sources by name. The operator's input comes after the sensors.
     ///
-    /// Before this call every message counts as unmatched.
+    /// Before this call, no message of the log has a source in the loop.
     pub fn connect(&mut self, sources: &[SourceInfo]) {
         let find = |id: &String| {
             let sensor = sources.iter().position(|source| source.id == *id);
@@ -88,7 +88,7 @@ impl Player {
         self.sources = self.ids.iter().map(find).collect();
     }
 
-    /// The current position, between two ticks.
+    /// Returns the current position, between two ticks.
     pub fn place(&self) -> PlayerPlace {
         PlayerPlace {
             log: self.reader.place(),
@@ -101,10 +101,10 @@ impl Player {
         }
     }
 
-    /// Continues from a position of this or another player of the same log and vehicle.
+    /// Continues from a position of this player, or of another player of the same log and vehicle.
     ///
-    /// Losses are counted as if the log had been played straight through. Losses found beyond the place remain reported
-    /// until playback passes them again.
+    /// Losses are then counted as if the log had been played straight through. Losses found after the position stay
+    /// in the list until playback passes them again.
     ///
     /// Errors: the log can't be read there.
     pub fn go_to(&mut self, place: &PlayerPlace) -> Result<(), LogError> {
@@ -122,23 +122,23 @@ impl Player {
         Ok(())
     }
 
-    /// The files of the log, in order.
+    /// Returns the files of the log, in order.
     pub fn files(&self) -> &[PartFile] {
         self.reader.files()
     }
 
-    /// Messages sent so far.
+    /// Returns the number of messages sent so far.
     pub fn played(&self) -> u64 {
         self.played
     }
 
-    /// Losses and omissions so far, as text, including those found before a jump back.
+    /// Returns losses and omissions so far, as text. Those found before a jump back are included.
     pub fn losses(&self) -> Vec<String> {
         let (order, losses) = &self.farthest;
         if *order > self.order { losses.clone() } else { self.losses_here() }
     }
 
-    /// Losses and omissions from the beginning to the current place.
+    /// Returns losses and omissions from the beginning of the log to the current position.
     fn losses_here(&self) -> Vec<String> {
         let mut all: Vec<String> = self.reader.losses().iter().map(Loss::to_string).collect();
         for (id, count) in &self.unmatched {
@@ -149,7 +149,7 @@ impl Player {
         }
         if self.reader.late() > 0 {
             all.push(format!(
-                "{} messages out of order by more than the reordering buffer holds, delivered in file order",
+                "{} messages too far out of order to be sorted, delivered in file order",
                 self.reader.late()
             ));
         }
@@ -163,7 +163,7 @@ impl Player {
         all
     }
 
-    /// Anomalies found so far and how they were handled, as text. Nothing was lost because of them.
+    /// Returns anomalies found so far, and how they were handled, as text. They lose no data.
     pub fn notes(&self) -> Vec<String> {
         let note = |(topic, ids): (String, Vec<u16>)| {
             let ids: Vec<String> = ids.iter().map(u16::to_string).collect();
@@ -172,7 +172,7 @@ impl Player {
         self.reader.doubles().into_iter().map(note).collect()
     }
 
-    /// Advances to the next message of a source that the loop has.
+    /// Reads the next message whose source the loop has.
     fn read(&mut self) -> Result<Option<Coming>, LogError> {
         while let Some(message) = self.reader.next()? {
             let MessageKind::Raw { source } = message.kind else { continue };
@@ -213,7 +213,7 @@ impl PacketSource for Player {
 
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
         let Some(coming) = self.next else { return Ok(()) };
-        // The program's own logs are in the loop's order of consumption, those of other writers in time order.
+        // This program's own logs are in the loop's order of consumption. Logs of other writers are in time order.
         let order = if self.reader.has_ticks() { self.order } else { NO_ORDER };
         port.send_in_order(coming.at, order, &self.bytes)?;
         self.order += 1;
@@ -223,7 +223,7 @@ impl PacketSource for Player {
     }
 }
 
-/// A time formatted for messages: seconds on the log's clock.
+/// Formats a time for messages: seconds on the log's clock.
 pub fn seconds(at: MonoNs) -> String {
     format!("{:.3} s", at.as_secs_f64())
 }

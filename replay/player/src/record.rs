@@ -16,30 +16,33 @@ use crate::log::{RecorderPort, ResultChannel};
 use crate::results::{HEAD_WORDS, STREAMS};
 use crate::view;
 
-/// Free bytes that the recorder's queue needs for the largest tick: packets, packet headers, and packet order.
+/// Free bytes that the largest tick needs in the recorder's queue: packets, their headers, and the list of their
+/// sources.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
-/// In a dive on ports, a tick may take the free room divided by this. Short packets take several times their length in
-/// the queue, together with their results.
+/// Divisor of the queue's free room that gives the limit for a tick in a dive on ports.
+///
+/// Short packets, together with their results, take several times their length in the queue.
 const SMALLER_TICK: usize = 8;
-/// Minimum room that a tick in a dive on ports may take: the longest packet of a port is some KiB.
+/// Minimum limit for a tick in a dive on ports, bytes. The longest packet of a port has some KiB.
 const MIN_TICK_BYTES: usize = 8 * 1024;
 
-/// Buffer for one stream's results of a tick, bytes; results beyond it are recorded in part.
+/// Size of the buffer for one stream's results of a tick, bytes. Results beyond it are not recorded.
 const MAX_RESULT_BYTES: usize = 1 << 19;
 
 /// Size of a recorder's queue, bytes.
 pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
 
-/// Size of a recorder's queue in a dive on ports, bytes. It holds some minutes of a vehicle with four heads while the
-/// medium takes nothing.
+/// Size of a recorder's queue in a dive on ports, bytes.
+///
+/// It holds some minutes of a vehicle with four heads while the medium accepts no data.
 pub const QUEUE_OF_PORTS_BYTES: usize = 16 * LARGEST_TICK_BYTES;
 
-/// The stream with a record per echo.
+/// Name of the stream that has a record per echo.
 const ECHOES: &str = "pings";
-/// Message encoding of a stream: see [`crate::results`].
+/// Message encoding of the result streams, see [`crate::results`].
 const ENCODING: &str = "headrace-trail";
-/// The channels of a loop's results: the streams first, then those of the viewers.
+/// Returns the channels for a loop's results: first the streams, then the channels for viewers.
 pub fn result_channels() -> Vec<ResultChannel> {
     let channel = |name: &&str| ResultChannel {
         topic: format!("{RESULT_PREFIX}{name}"),
@@ -52,9 +55,10 @@ pub fn result_channels() -> Vec<ResultChannel> {
     STREAMS.iter().map(channel).chain(view::channels()).collect()
 }
 
-/// The results of a loop's last tick as messages with channel numbers, for a [`crate::log::DerivedChannels`].
+/// Returns the results of a loop's last tick as messages, for a [`crate::log::DerivedChannels`].
 ///
-/// The loop must keep its results. Allocates, so it is only for outlets between ticks.
+/// Each message has the number of its channel. The loop must keep its results. This function allocates, so it may be
+/// called only by outlets between ticks.
 pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
     let streams = (0..).zip(dive.digests().streams());
     let filled = streams.filter(|(_, (_, trail))| !trail.words().is_empty());
@@ -66,30 +70,30 @@ pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
     filled.map(message).collect()
 }
 
-/// Records every packet that the loop consumes, every tick and every result, with one or several recorders.
+/// Records with one or several recorders every packet that the loop consumes, every tick and every result.
 ///
 /// Packets are recorded in the order of consumption. If a recorder's queue has no room for another largest tick, the
-/// loop consumes nothing until there is room: recorded input is never dropped. A dive on ports doesn't wait
-/// ([`RecorderOutlet::of_ports`]). If the recorders' threads have ended, the dive continues unrecorded; their handles
-/// return the errors.
+/// loop consumes nothing until there is room. Recorded input is therefore never dropped.
+///
+/// A dive on ports doesn't wait, see [`RecorderOutlet::of_ports`]. If all recorders have ended, the dive continues
+/// without recording; their handles return the errors.
 pub struct RecorderOutlet {
     ports: Cell<Vec<RecorderPort>>,
     is_of_ports: bool,
 }
 
 impl RecorderOutlet {
-    /// Creates the outlet from the loop's ends of recorders, whose queues have [`QUEUE_BYTES`].
+    /// Creates the outlet from the loop's ends of recorders, whose queues must have [`QUEUE_BYTES`].
     ///
-    /// The outlet can be added to one loop.
+    /// The outlet can be added to one loop only.
     pub fn new(ports: impl IntoIterator<Item = RecorderPort>) -> Self {
         Self { ports: Cell::new(ports.into_iter().collect()), is_of_ports: false }
     }
 
-    /// Makes the outlet never wait for a recorder, for a dive on ports: a blocked medium must not cost the pilot
-    /// advice.
+    /// Makes the outlet never wait for a recorder. For a dive on ports, where a blocked medium must not delay advice.
     ///
-    /// A recorder whose queue is full skips ticks, reports it ([`RecordingEvent::Behind`](crate::log::RecordingEvent)),
-    /// and states them in its log.
+    /// A recorder whose queue is full skips ticks. It reports that
+    /// ([`RecordingEvent::Behind`](crate::log::RecordingEvent)), and states the skipped ticks in its log.
     #[must_use]
     pub fn of_ports(self) -> Self {
         Self { is_of_ports: true, ..self }
@@ -101,9 +105,9 @@ struct Recording {
     ports: Vec<RecorderPort>,
     is_of_ports: bool,
     order: Vec<u16>,
-    /// Buffer for a stream's message.
+    /// Buffer for the message of a stream.
     message: Vec<u8>,
-    /// Number of records of each stream up to the previous tick.
+    /// Number of records of each stream before this tick.
     records: [u64; STREAMS.len()],
 }
 
@@ -137,10 +141,10 @@ fn record(
     let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
     let needed = bytes + RecorderPort::tick_entry_bytes(count);
     for port in ports.iter_mut().filter(|port| !port.is_closed()) {
-        // A recorder that is behind resumes once there is ample room, rather than with each small tick that would fit.
+        // A recorder that skips ticks resumes only with ample room, and not with each small tick that would fit.
         let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
         if count > 0 && port.vacant_bytes() < needed {
-            // Only happens in a dive on ports; otherwise the allowance has reserved the room.
+            // This happens only in a dive on ports. In other dives the allowance has reserved the room.
             port.skip(time.now, count as u64);
             continue;
         }
@@ -154,23 +158,23 @@ fn record(
     inbox.allowance_bytes = allowance_bytes(open, *is_of_ports);
 }
 
-/// Bytes that the next tick may take.
+/// Returns how many bytes of packets the next tick may consume.
 fn allowance_bytes<'a>(open: impl Iterator<Item = &'a RecorderPort>, is_of_ports: bool) -> usize {
     let rooms = open.filter(|port| !is_of_ports || !port.is_behind()).map(RecorderPort::vacant_bytes);
     let room = if is_of_ports { rooms.max() } else { rooms.min() };
     match room {
         Some(room) if room < LARGEST_TICK_BYTES && is_of_ports => (room / SMALLER_TICK).max(MIN_TICK_BYTES),
         Some(room) if room < LARGEST_TICK_BYTES => 0,
-        // There is no open recorder, or all of them skip ticks.
+        // No recorder is open, or all recorders skip ticks.
         Some(_) | None => MAX_TICK_BYTES,
     }
 }
 
-/// Records a tick's packets, in the order of consumption.
+/// Records the packets of a tick, in the order of consumption, and the tick itself.
 fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &mut Vec<u16>) {
     order.clear();
     for (source, packet) in inbox.iter() {
-        // The room for all of these entries has been checked above.
+        // The caller has checked that all of these entries fit.
         if port.raw(source.0, packet.received, packet.received, packet.bytes).is_ok() {
             order.push(source.0);
         }
@@ -180,9 +184,9 @@ fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &
     }
 }
 
-/// Records a tick's results.
+/// Records the results of a tick.
 ///
-/// Results that don't fit are omitted, since input has priority; gaps in the record numbers show the omission.
+/// Input has priority, so results that don't fit are left out. Gaps in the record numbers show that.
 fn record_results(
     port: &mut RecorderPort,
     results: &Digests,
@@ -201,7 +205,7 @@ fn record_results(
     }
 }
 
-/// Writes a stream's words into a message, without allocating; `false` if they don't all fit.
+/// Writes the words of a stream into a message, without allocation. Returns `false` if they don't all fit.
 fn fill(message: &mut Vec<u8>, tick: u64, before: u64, words: &[u64]) -> bool {
     message.clear();
     let room = message.capacity() / 8 - HEAD_WORDS;

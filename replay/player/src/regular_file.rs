@@ -1,4 +1,5 @@
-//! Opens and reads regular files only. A pipe without a writer would block for ever, and a device may never end.
+//! Opens and reads regular files only. Reading a pipe without a writer would block for ever, and a device may never
+//! end.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};
@@ -6,7 +7,7 @@ use std::path::Path;
 
 /// Opens a regular file for reading.
 ///
-/// Errors: those of the system; or the path is a pipe, a device or a socket.
+/// Errors: those of the system; the path is a pipe, a device or a socket.
 pub fn open(path: &Path) -> Result<File> {
     let kind = std::fs::metadata(path)?.file_type();
     if !kind.is_file() && !kind.is_dir() {
@@ -20,7 +21,7 @@ pub fn open(path: &Path) -> Result<File> {
 
 /// Reads a regular file of at most `most_bytes`.
 ///
-/// Errors: as for [`open`]; or the file is longer.
+/// Errors: as for [`open`]; the file is longer.
 pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
@@ -31,9 +32,9 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a regular UTF-8 text file of at most `most_bytes`.
+/// Reads a regular text file of at most `most_bytes`, in UTF-8.
 ///
-/// Errors: as for [`read`]; or it isn't UTF-8.
+/// Errors: as for [`read`]; the file isn't UTF-8.
 pub fn read_text(path: &Path, most_bytes: u64) -> Result<String> {
     String::from_utf8(read(path, most_bytes)?)
         .map_err(|_| Error::new(ErrorKind::InvalidData, "stream did not contain valid UTF-8"))

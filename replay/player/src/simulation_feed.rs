@@ -9,14 +9,14 @@ use headrace_simulator::{START, Simulation};
 use crate::drive::{Coming, PacketSource};
 use crate::log::LogError;
 
-/// A simulated dive as a source of packets; bytes sent to the devices are omitted.
+/// A simulated dive as a source of packets. Bytes sent to devices are left out.
 pub struct SimulationFeed {
-    /// The simulation, at its current point.
+    /// The simulation, at its current position.
     pub simulation: Simulation,
 }
 
 impl SimulationFeed {
-    /// Starts at the dive's first message.
+    /// Creates a feed that starts at the first message of the dive.
     pub fn new(simulation: Simulation) -> Self {
         Self { simulation }
     }

@@ -1,6 +1,8 @@
-//! Stores the navigation filter's steps on disk during a first replay, then smooths them backwards for a second replay.
+//! Smooths a dive in two replays.
 //!
-//! The steps don't fit in memory. An unlinked file holds them and disappears with the process.
+//! During the first replay the steps of the navigation filter are stored on disk. They are then smoothed backwards,
+//! and the second replay uses the result. The steps don't fit in memory. An unlinked file holds them, and disappears
+//! with the process.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
@@ -19,39 +21,40 @@ use headrace_monitor::run::Loop;
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_vehicle::VehicleConfig;
 
-/// Capacity of the queue of filter steps. A tick spans at most a minute, with ten epochs per second and up to three
-/// steps per epoch.
+/// Capacity of the queue of filter steps.
+///
+/// A tick spans a minute at most, with ten epochs per second and up to three steps per epoch.
 const QUEUED: usize = 4096;
-/// Bytes per record.
+/// Length of a record, bytes.
 const RECORD: usize = 8 * WORDS;
-/// Records per read.
+/// Number of records per read.
 const BLOCK: u64 = 256;
-/// Number of file names to try.
+/// Maximum number of file names tried.
 const NAMES: u32 = 1000;
 
-/// Why a dive could not be smoothed.
+/// Reason why a dive could not be smoothed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SmoothError {
-    /// The file that holds the steps can't be made, written or read.
+    /// The file for the steps can't be created, written or read.
     #[error("keeping the filter's steps in a file of {}, {bytes} bytes so far: {source}", folder.display())]
     File {
-        /// Its folder.
+        /// Folder of the file.
         folder: PathBuf,
-        /// Its length, bytes.
+        /// Length of the file, bytes.
         bytes: u64,
-        /// Cause.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The filter produced steps faster than they were stored.
+    /// Steps were lost, because the filter produced them faster than they were stored.
     #[error("keeping the filter's steps: {lost} steps of a tick were lost; a tick may have up to {queued}")]
     Lost {
-        /// Steps lost.
+        /// Number of lost steps.
         lost: u64,
-        /// Queue capacity, steps.
+        /// Capacity of the queue, steps.
         queued: usize,
     },
-    /// A record read back isn't the one written.
+    /// A record that was read back differs from the one written.
     #[error("reading the filter's steps back: record {record} is damaged")]
     Damaged {
         /// Record number, from zero.
@@ -59,7 +62,7 @@ pub enum SmoothError {
     },
 }
 
-/// The first of two replays, which runs the filter and stores its steps for smoothing.
+/// The first of two replays: runs the filter, and stores its steps for smoothing.
 pub struct FirstPass {
     settings: Settings,
     steps: Steps,
@@ -67,8 +70,9 @@ pub struct FirstPass {
 }
 
 impl FirstPass {
-    /// Creates the first pass from the navigation that the replay is armed with. The file of steps is in the system's
-    /// temporary folder.
+    /// Creates the first pass, and the navigation with which the first replay must be armed.
+    ///
+    /// The file of steps is in the system's temporary folder.
     ///
     /// Errors: the file can't be created.
     pub fn new(
@@ -82,15 +86,15 @@ impl FirstPass {
         Ok((Self { settings, steps, consistency: [None; MAX_SOURCES] }, Box::new(navigation)))
     }
 
-    /// Stores the steps of the last tick; must be called after every tick.
+    /// Stores the steps of the last tick. Must be called after every tick.
     pub fn after_tick(&mut self, dive: &Loop) {
         self.steps.take();
         self.consistency = core::array::from_fn(|source| dive.consistency(source));
     }
 
-    /// Smooths from the last step to the first. The second replay uses the returned navigation.
+    /// Smooths from the last step to the first. Returns the navigation for the second replay.
     ///
-    /// Errors: a step was lost, or the file of steps couldn't be written or read.
+    /// Errors: a step was lost, or the file of steps can't be written or read.
     pub fn smooth(self) -> Result<(Box<dyn Navigation>, Changes), SmoothError> {
         let (records, lost) = (self.steps.records, self.steps.journal.dropped());
         if lost > 0 {
@@ -103,7 +107,7 @@ impl FirstPass {
     }
 }
 
-/// Size of the changes made by smoothing.
+/// Extent of smoothing, for the report.
 #[derive(Debug, Clone, Copy)]
 pub struct Changes {
     estimates: u64,
@@ -111,14 +115,14 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Adds the changes since the first replay to the second replay's report.
+    /// Adds to the second replay's report how much it differs from the first replay's report.
     pub fn complete(self, first: &Report, second: &mut Report) {
         let changes = smoothing_changes::compare(first, second, self.estimates, self.pieces);
         second.smoothing = Some(changes);
     }
 }
 
-/// The stored filter steps of a replay in progress.
+/// Filter steps of a replay, stored in a file.
 struct Steps {
     journal: JournalReader,
     folder: PathBuf,

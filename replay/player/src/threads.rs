@@ -1,8 +1,8 @@
 //! Drives a loop from a log on several threads, or several loops that share one navigation.
 //!
-//! One thread reads, decodes, navigates and places pings, one advises, and the caller's thread does the rest. Bounded
-//! queues pass batches of ticks between them. Each stage processes all ticks in order, so results are identical bit for
-//! bit on any number of threads: see [`headrace_monitor::split`].
+//! One thread reads, decodes, navigates and places pings. Another one advises. The caller's thread does the rest.
+//! Bounded queues pass batches of ticks between the threads. Each stage processes all ticks in order, so the results
+//! are identical bit for bit on any number of threads: see [`headrace_monitor::split`].
 
 use std::any::Any;
 use std::sync::Arc;
@@ -16,27 +16,27 @@ use headrace_sampling::advice::Advice;
 
 use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
 
-/// Maximum number of threads on which a loop can be driven: placing, advising, and the rest.
+/// Maximum number of threads for one loop: placing, advising, and the rest.
 pub const MOST_THREADS: usize = 3;
 
-/// Ticks per batch: a queue operation is then needed only once for some milliseconds of work.
+/// Number of ticks in a batch. One queue operation then passes some milliseconds of work.
 const BATCH_TICKS: usize = 32;
-/// Maximum number of batches waiting between two threads.
+/// Maximum number of batches that wait between two threads.
 const MOST_WAITING: usize = 4;
-/// Room for all batches that can come back: those in two queues and those being processed.
+/// Capacity of the queue of used batches: those of two queues, and those being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 
-/// Ticks with their pings placed, and the advice at their updates.
+/// A batch of ticks, with their placed pings and their advice.
 #[derive(Default)]
 struct Batch {
     ticks: Vec<PlacedTick>,
     advice: Vec<Vec<Advice>>,
-    /// Number of ticks in use; the remaining elements are kept for reuse.
+    /// Number of ticks in use. Further elements are kept for reuse.
     len: usize,
 }
 
 impl Batch {
-    /// An element for the next tick.
+    /// Returns an element for the next tick.
     fn next(&mut self) -> &mut PlacedTick {
         if self.len == self.ticks.len() {
             self.ticks.push(PlacedTick::default());
@@ -56,8 +56,8 @@ impl Batch {
 
 /// Runs the loop until the source ends, as fast as possible, on up to `threads` threads including the caller's.
 ///
-/// `after_tick` is called on the caller's thread after every tick. The results equal those of [`drive`]. It calls
-/// [`drive`] for one thread, or if a plugin adds systems to those that place pings.
+/// `after_tick` is called on the caller's thread after every tick. The results equal those of [`drive`], which is
+/// used for one thread, and if a plugin adds systems to the placing of pings.
 ///
 /// Errors: see [`DriveError`]. Packets fed before the error have been processed, unless a thread has panicked.
 pub fn drive_on(
@@ -115,7 +115,7 @@ fn drive_parts(
             for (tick, advice) in batch.ticks.iter_mut().zip(&mut batch.advice).take(batch.len) {
                 run_tick(dive, &mut |dive| dive.tick_taken(tick, advice), after_tick);
             }
-            // Ignored: the placing thread may have ended.
+            // An error means that the placing thread has ended and needs no batches.
             used.try_send(batch).ok();
         }
         beside.map_or(Ok(()), |beside| joined(beside, "advises"))?;
@@ -123,7 +123,7 @@ fn drive_parts(
     })
 }
 
-/// Runs the later stages of a tick; gives a slow outlet time.
+/// Runs the later stages of a tick. Waits while an outlet is too slow.
 fn run_tick(dive: &mut Loop, tick: &mut dyn FnMut(&mut Loop) -> bool, after_tick: &mut dyn FnMut(&Loop)) {
     while !tick(dive) {
         after_tick(dive);
@@ -132,7 +132,7 @@ fn run_tick(dive: &mut Loop, tick: &mut dyn FnMut(&mut Loop) -> bool, after_tick
     after_tick(dive);
 }
 
-/// Places the pings of a source until it ends, or until the receiver is gone; `unused` returns batches for reuse.
+/// Places the pings of a source until it ends, or until the receiver has gone. `unused` returns batches for reuse.
 fn place(
     placer: &mut Placer,
     mut driver: Driver,
@@ -173,10 +173,10 @@ fn place(
 
 /// Runs several loops until the source ends, with the navigation of the first loop.
 ///
-/// Packets are decoded and pings placed once. Each loop gives the results it would give alone.
+/// Packets are decoded and pings are placed only once. Each loop gives the results that it would give alone. The
+/// loops must be armed with the same navigation, which can't be checked.
 ///
-/// Errors: see [`DriveError`]; also if loops differ in anything except the target, the sections and the requirements on
-/// them. They must be armed with the same navigation, which can't be checked.
+/// Errors: see [`DriveError`]; loops differ in more than the target, the sections and the requirements on them.
 pub fn drive_together(
     threads: usize,
     dives: &mut [Loop],
@@ -233,7 +233,8 @@ fn drive_all(
             covering.push(scope.spawn(move || {
                 for batch in placed {
                     cover_all(&mut some, &batch);
-                    // The last loop returns the batch. Ignored: the placing thread may have ended.
+                    // The last loop returns the batch. An error means that the placing thread has ended and needs no
+                    // batches.
                     if let Some(batch) = Arc::into_inner(batch) {
                         used.try_send(batch).ok();
                     }
@@ -263,7 +264,7 @@ fn cover_all(dives: &mut [(&mut Loop, &mut Advising)], batch: &Batch) {
     }
 }
 
-/// Returns the result of a thread; a panic becomes an error.
+/// Waits for a thread, and returns its result. A panic becomes an error.
 pub(crate) fn joined<T>(thread: ScopedJoinHandle<'_, T>, what: &'static str) -> Result<T, DriveError> {
     thread.join().map_err(|panic| DriveError::Panicked { what, message: words_of(panic.as_ref()) })
 }

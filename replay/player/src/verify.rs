@@ -1,4 +1,4 @@
-//! Compares a live dive's published results with those of its replay, record by record and bit for bit.
+//! Compares the results that a live dive published with those of its replay, record by record and bit by bit.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -10,18 +10,20 @@ use crate::log::format::RESULT_PREFIX;
 use crate::log::{DiveLog, LogError, MessageKind};
 use crate::results::{STREAMS, read_results, stream_of};
 
-/// Maximum memory of one stream's results that wait for the replay, bytes. In an intact log they are one tick ahead.
+/// Maximum memory of one stream's live results that wait for the replay, bytes.
+///
+/// In an intact log the live results are only one tick ahead.
 const MOST_WAITING: usize = 16 << 20;
 
-/// Streams that older logs don't have.
+/// Streams that logs of earlier versions don't have.
 const LATER: [&str; 2] = ["states", "alerts"];
 
-/// The first difference between a replay and the dive.
+/// The first difference between a live dive and its replay.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Difference {
-    /// The live dive's tick that published it.
+    /// Tick of the live dive that published the record.
     pub tick: u64,
-    /// The stream: poses, pings, judgements, advice, states or alerts.
+    /// Name of the stream: poses, pings, judgements, advice, states or alerts.
     pub stream: &'static str,
     /// Number of the record in its stream, from zero.
     pub record: u64,
@@ -32,61 +34,61 @@ pub struct Difference {
 /// Difference between two records.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum What {
-    /// A field of a record.
+    /// A field has different values.
     Field {
-        /// The kind of record.
+        /// Kind of the record.
         kind: RecordKind,
-        /// Number of the source, if the record is a ping.
+        /// Source number, if the record is a ping.
         source: Option<u64>,
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// The field's type.
+        /// Type of the field.
         word: WordKind,
-        /// Its bits in the live dive.
+        /// Bits of the field in the live dive.
         live: u64,
-        /// Its bits in the replay.
+        /// Bits of the field in the replay.
         replayed: u64,
     },
-    /// A record of another kind, or with another number of fields.
+    /// The records are of different kinds, or have different numbers of fields.
     Kind {
-        /// In the live dive.
+        /// Kind of the record in the live dive.
         live: &'static str,
-        /// In the replay.
+        /// Kind of the record in the replay.
         replayed: &'static str,
     },
-    /// The dive published a record that the replay doesn't have.
+    /// The live dive published a record that the replay doesn't have.
     Missing,
-    /// The replay has a record that the dive didn't publish.
+    /// The replay has a record that the live dive didn't publish.
     Added,
 }
 
-/// Compares during a replay.
+/// Compares a replay with its live dive while the replay runs.
 pub struct Verifier {
     reader: DiveLog,
     streams: [Stream; STREAMS.len()],
-    /// Tick of the results read last.
+    /// Tick of the live results that were read last.
     last_tick: u64,
     has_results: bool,
     at_end: bool,
 }
 
-/// A stream of the live dive's results.
+/// A stream of the live dive's results, and its comparison.
 #[derive(Default)]
 struct Stream {
     waiting: VecDeque<Batch>,
     /// Memory of the waiting batches, bytes.
     waiting_bytes: usize,
-    /// Number of the replay's next record.
+    /// Number of the replay's next record in this stream.
     next: u64,
     same: u64,
     unrecorded: u64,
     difference: Option<Difference>,
 }
 
-/// A tick's records as read from the log.
+/// Records of one tick, as read from the log.
 struct Batch {
     tick: u64,
-    /// Number of the record that begins at `at`.
+    /// Number of the record at position `at`.
     next: u64,
     words: Vec<u64>,
     at: usize,
@@ -103,7 +105,7 @@ impl Batch {
 }
 
 impl Stream {
-    /// The live record with the replay's next number, if it is at the front of the queue.
+    /// Returns the live record with the replay's next number, if it is at the front of the queue.
     fn front(&self) -> Option<(u64, Record<'_>)> {
         let batch = self.waiting.front().filter(|batch| batch.next == self.next)?;
         first_record(batch.rest()).map(|(record, _)| (batch.tick, record))
@@ -128,9 +130,10 @@ impl Stream {
         }
     }
 
-    /// Adds a tick's results. If too many wait, the dive published results that the replay doesn't have.
+    /// Adds the live results of a tick. If too many wait, the live dive published results that the replay doesn't
+    /// have.
     fn wait(&mut self, batch: Batch, name: &'static str) {
-        // Nothing is compared after the first difference.
+        // After the first difference nothing more is compared.
         if self.difference.is_some() {
             return;
         }
@@ -153,20 +156,20 @@ impl Stream {
 /// Result of a comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verified {
-    /// Identical records.
+    /// Number of identical records.
     pub same: u64,
-    /// Records of the dive missing from its log.
+    /// Number of replay records that the live dive's log doesn't have.
     pub unrecorded: u64,
-    /// The first difference of each stream that has one, the earliest tick first.
+    /// The first difference of each stream that has one, ordered by tick.
     pub differences: Vec<Difference>,
-    /// Whether the log contains results to compare.
+    /// Whether the log has results to compare.
     pub has_results: bool,
 }
 
 impl Verifier {
     /// Opens a log for comparison.
     ///
-    /// The log is read along with the replay; only the records between the two positions are held in memory.
+    /// The log is read along with the replay. Only live records that the replay hasn't reached are in memory.
     ///
     /// Errors: the log can't be read.
     pub fn open(log: &[PathBuf]) -> Result<Self, LogError> {
@@ -204,8 +207,8 @@ impl Verifier {
             if let Some(tick) = left {
                 stream.part(tick, name, What::Missing);
             }
-            // Older logs have no channel for the live state or the alerts. A log without any results isn't the log of a
-            // live dive.
+            // Logs of earlier versions have no channel for states or alerts. A log without any results isn't the log
+            // of a live dive.
             let is_told = has_results && (has_channel(name) || !LATER.contains(&name));
             verified.same += stream.same;
             verified.unrecorded += stream.unrecorded;
@@ -215,10 +218,10 @@ impl Verifier {
         Ok(verified)
     }
 
-    /// Compares a record of the replay with the live dive's record of the same number.
+    /// Compares a record of the replay with the live record of the same number.
     fn compare(&mut self, number: usize, name: &'static str, record: Record<'_>) -> Result<(), LogError> {
         while self.streams.get(number).is_some_and(|stream| stream.waiting.is_empty()) && self.read()? {}
-        // A truncated log ends before its dive did.
+        // A truncated log ends before its dive did, so missing live records are no difference.
         let cut_off = self.reader.has_losses();
         let Some(stream) = self.streams.get_mut(number).filter(|stream| stream.difference.is_none()) else {
             return Ok(());
@@ -237,7 +240,7 @@ impl Verifier {
         Ok(())
     }
 
-    /// Advances to the next results; false at the end.
+    /// Reads the live results of another tick. Returns `false` at the end of the log.
     fn read(&mut self) -> Result<bool, LogError> {
         while !self.at_end {
             let Some(message) = self.reader.next()? else {
@@ -260,7 +263,7 @@ impl Verifier {
     }
 }
 
-/// Difference between a record of the live dive and the replay's.
+/// Returns the difference between a live record and a replayed one.
 fn difference(live: Record<'_>, replayed: Record<'_>) -> Option<What> {
     let (Some(kind), true) =
         (live.kind, live.kind == replayed.kind && live.words.len() == replayed.words.len())
@@ -294,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn one_bit_of_one_field_is_found_and_named() {
+    fn difference_of_one_bit_is_reported_with_its_field() {
         let (live, replayed) = (sample(12.5), sample(12.5_f64.next_up()));
         assert_eq!(difference(record(&live), record(&live)), None);
         let expected = What::Field {
@@ -314,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn records_missing_from_a_log_are_skipped_by_number() {
+    fn records_missing_from_a_log_are_skipped() {
         let mut stream = Stream::default();
         let head = RecordKind::Run as u64 | (1 << 8);
         stream.wait(Batch { tick: 4, next: 0, words: vec![head, 7], at: 0 }, "poses");
@@ -329,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn results_far_ahead_of_the_replay_are_a_difference_in_bounded_memory() {
+    fn live_results_far_ahead_of_the_replay_are_reported_in_bounded_memory() {
         let mut stream = Stream::default();
         let batch =
             |tick| Batch { tick, next: tick, words: vec![RecordKind::Run as u64 | 2047 << 8; 4096], at: 0 };

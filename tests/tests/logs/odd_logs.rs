@@ -81,7 +81,7 @@ fn messages_too_late_to_be_ordered_are_counted() {
     folder.write("lying.mcap", bytes);
     let answer = replay(&folder, "lying.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @"LOST: 419 messages out of order by more than the reordering buffer holds, delivered in file order");
+    insta::assert_snapshot!(told(&answer), @"LOST: 419 messages too far out of order to be sorted, delivered in file order");
 }
 
 #[test]

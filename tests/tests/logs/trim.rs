@@ -79,8 +79,8 @@ fn trimmed_log_states_the_cut_and_keeps_the_verdicts_inside() {
         let (code, report) = folder.replay(name, &[]);
         let losses = report["log"]["losses"].to_string();
         assert_eq!(code, Some(3), "{name}: {losses}");
-        assert!(losses.contains("the part before was removed by headrace trim (before "), "{losses}");
-        assert!(losses.contains("the part after was removed by headrace trim (after "), "{losses}");
+        assert!(losses.contains("earlier data was cut off by headrace trim (before "), "{losses}");
+        assert!(losses.contains("later data was cut off by headrace trim (after "), "{losses}");
         assert_eq!(within(&report, 12.0, 19.0), expected, "{name}");
         let answer = folder.headrace(&["verify", name]);
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);

@@ -139,7 +139,7 @@ export class World {
     const from_s = this.t_s, from_m = this.at_m, speed = this.speed_mps * (this.playback?.speed ?? 1);
     this.t_s += by_s;
     this.at_m = Math.min(this.length_m, this.at_m + speed * by_s);
-    // A stretch passed too fast is missed once it has been left.
+    // A stretch passed too fast counts as missed once the vehicle has left it.
     const run_m = Math.floor(this.at_m / 137) * 137 + 12;
     if (this.at_m > run_m + 7.25 && from_m <= run_m + 7.25) this.missed(run_m);
     for (const [id, since] of this.dead) {

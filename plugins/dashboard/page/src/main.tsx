@@ -1,4 +1,4 @@
-// The operator's page: everything, or by its path one part of it.
+// The operator's page. A widget's path shows only one part of the page.
 import { render } from "preact";
 import { AlertAnnouncer, Alerts } from "./alerts/Alerts";
 import { startSound } from "./alerts/sound";
@@ -55,7 +55,7 @@ const WIDGETS: Record<string, () => preact.JSX.Element> = {
   alerts: () => <><h1 class="sr">headrace: alerts</h1><Token /><main><Alerts /></main><AlertAnnouncer /></>,
 };
 
-/** The whole page is visibly old if its data is, whichever part is shown. */
+/** Marks the whole page as old if the data is old, whichever part is shown. */
 function watch(): void {
   const { dataset } = document.documentElement;
   const lost = lost_s(store);

@@ -85,7 +85,7 @@ describe("display", () => {
     await page.locator(".recording", { hasText: "NOT RECORDED" }).waitFor();
   }));
 
-  it("serves its parts by their paths", async () => {
+  it("serves each widget at its path", async () => {
     for (const [path, there] of [["speed", ".gauge"], ["wall", ".wall-box canvas"], ["alerts", ".alert-list"]]) {
       await on({}, async ({ page }) => {
         await page.locator(there).first().waitFor();
@@ -96,7 +96,7 @@ describe("display", () => {
     }
   });
 
-  it("shows everything else without WebGL2", () => on({}, async ({ page }) => {
+  it("shows everything except the wall without WebGL2", () => on({}, async ({ page }) => {
     await page.locator(".missing", { hasText: "no WebGL2" }).waitFor();
     await condition(page, "good");
   }, { init: (page) => page.addInitScript(() => {
@@ -125,7 +125,7 @@ describe("voice notes", () => {
     }
   }
 
-  it("creates a note when it begins, shows its seconds, and plays", () => spoken(async ({ mock, page }) => {
+  it("is created when the recording begins, shows its seconds, and plays", () => spoken(async ({ mock, page }) => {
     await voice(page).click();
     await page.locator(".notes .voice.recording", { hasText: "End 0:01" }).waitFor();
     const [begun] = mock.control({}).notes;
@@ -144,7 +144,7 @@ describe("voice notes", () => {
     assert.equal(await page.locator(".said.refused").count(), 0);
   }));
 
-  it("ends a held recording on release", () => spoken(async ({ page }) => {
+  it("ends when a held button is released", () => spoken(async ({ page }) => {
     await voice(page).hover();
     await page.mouse.down();
     await page.locator(".notes .voice.recording", { hasText: "End 0:01" }).waitFor();
@@ -152,7 +152,7 @@ describe("voice notes", () => {
     await page.locator(".notes li", { hasText: /voice, [12] s/ }).waitFor();
   }));
 
-  it("reports a recording that can't be stored, and sends it again", () => spoken(async ({ mock, page }) => {
+  it("reports that its recording can't be stored, and sends it again", () => spoken(async ({ mock, page }) => {
     mock.control({ refuses: "the voice note isn't recorded: nothing is being recorded at present" });
     await voice(page).click();
     await page.locator(".notes .voice.recording").waitFor();
@@ -162,7 +162,7 @@ describe("voice notes", () => {
     await page.locator(".notes .voice.unsent", { hasText: "Send again" }).click();
     await page.locator(".notes li", { hasText: "voice, 1 s" }).waitFor();
     await page.locator(".notes .voice.idle").waitFor();
-    // It is sent without help once there is a connection again.
+    // The recording is sent automatically once the connection is back.
     await voice(page).click();
     await page.locator(".notes .voice.recording").waitFor();
     mock.control({ closed: true });
@@ -172,7 +172,7 @@ describe("voice notes", () => {
     await page.locator(".notes li", { hasText: "voice, 1 s" }).nth(1).waitFor();
   }));
 
-  it("gives the reason without a microphone, a secure page or a recorded dive", async () => {
+  it("gives the reason if the microphone, a secure page or a recorded dive is missing", async () => {
     const told = (page, words) => page.locator(".notes .voice-words", { hasText: words }).waitFor();
     await on({ mode: "demo" }, async ({ mock, page }) => {
       await condition(page, "good");
@@ -194,7 +194,7 @@ describe("voice notes", () => {
 });
 
 describe("alerts", () => {
-  it("show a stretch passed too fast once, acknowledged in one browser and displayed in the other", () => on({ at_m: 148 }, async ({ mock, page, again }) => {
+  it("list a stretch passed too fast once; an acknowledgement in one browser appears in the other", () => on({ at_m: 148 }, async ({ mock, page, again }) => {
     await condition(page, "good");
     mock.control({ speed_mps: 0.5 });
     await condition(page, "too_fast");
@@ -235,7 +235,7 @@ describe("alerts", () => {
     const before = await listed(page);
     assert.ok(before.fits, "the page has grown over its window");
     assert.ok(before.whole.length >= 10, `${before.whole.length} of 20 can be read`);
-    // The only alarm comes first, and an item cut by the edge counts as either shown or hidden.
+    // The only alarm is first in the list. An item cut off by the edge may count as shown or as hidden.
     assert.equal(before.whole[0], 4);
     assert.ok([0, 1].includes(20 - before.whole.length - before.hidden), JSON.stringify(before));
     await page.locator(".alert-list").focus();
@@ -244,7 +244,7 @@ describe("alerts", () => {
     const after = await listed(page);
     assert.ok(after.whole.length >= 10 && after.all === 20, JSON.stringify(after));
     assert.ok(!after.whole.includes(4) && after.fits, JSON.stringify(after));
-    // An item opens while it has the focus, with its action.
+    // An item with the focus opens and shows its action.
     const last = page.locator(".alert").last(), advice = last.locator(".do");
     assert.ok(!(await advice.isVisible()));
     await last.getByRole("button", { name: /Ack alert/ }).focus();
@@ -254,7 +254,7 @@ describe("alerts", () => {
     await page.waitForFunction((hidden) => Number.parseInt(document.querySelector(".alerts .more")?.textContent ?? "0", 10) === hidden, before.hidden);
   }));
 
-  it("count those beyond the list, which move up as others are acknowledged", () => on({ at_m: 1 }, async ({ mock, page }) => {
+  it("count alerts beyond the list; these move up as others are acknowledged", () => on({ at_m: 1 }, async ({ mock, page }) => {
     await page.locator(".alert-list .none").waitFor();
     raised(mock, 70);
     await page.waitForFunction(() => document.querySelectorAll(".alert").length === 64);
@@ -330,14 +330,14 @@ describe("connection", () => {
     await word(page, "GOOD");
   }));
 
-  it("survives a reload, and a restart of the program as another instance", () => on({ at_m: 90 }, async ({ mock, page }) => {
+  it("resumes after a reload, and after a restart of the program", () => on({ at_m: 90 }, async ({ mock, page }) => {
     await condition(page, "good");
     mock.control({ missed_m: 80 });
     await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor();
     await page.reload();
     await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor();
     mock.control({ restart: "mock-2" });
-    // Another instance: the data of the first is gone.
+    // The page shows another instance and none of the first instance's data.
     await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor({ state: "detached" });
     await condition(page, "good");
   }));
@@ -457,7 +457,7 @@ function lab([r, g, b]) {
 }
 
 describe("exported dive", () => {
-  it("opens without a network, with a slider over its time", async () => {
+  it("opens without a network, with a time slider", async () => {
     const world = new World({ length_m: 7000, at_m: 60 });
     const states = [], t_s = [];
     for (let n = 0; n < 20; n += 1) { world.step(1); t_s.push(world.t_s); states.push(world.state()); }

@@ -55,7 +55,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     rmSync(folder, { recursive: true, force: true });
   });
 
-  it("raises one alert for a stretch passed too fast, acknowledged for all, in the log and its replay", async () => {
+  it("raises one alert for a stretch passed too fast; its acknowledgement is in all browsers, the log and the replay", async () => {
     const out = join(folder, "demo");
     const { child, url } = await start(folder, await freePort(), "demo", "--no-open", "--out", out, "--force", "--speed", "6x");
     const one = await open(chromium, url), other = await open(chromium, url);
@@ -96,7 +96,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     const alert = report.alert_list.find((alert) => alert.number === Number(number));
     assert.deepEqual([alert.kind, alert.state, alert.acknowledged?.by], ["missed", "cleared", "page"]);
     assert.ok(await page.getByRole("button", { name: "Acknowledge all" }).isDisabled());
-    // The program is killed and restarted: the page reports it, and recovers without help.
+    // The program is killed and restarted. The page reports the loss, and recovers by itself.
     await stop(replay.child);
     await page.locator(".word", { hasText: "NO CONNECTION" }).waitFor();
     await start(folder, port, "replay", join(out, "dive.mcap"), "--speed", "8x");
@@ -106,7 +106,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await context.close();
   });
 
-  it("shows a voice note of one browser in the other, in the log, and in the replay", async () => {
+  it("shows a voice note of one browser in the other browser, in the log and in the replay", async () => {
     const out = join(folder, "spoken");
     const { child, url } = await start(folder, await freePort(), "demo", "--no-open", "--out", out, "--force", "--speed", "4x");
     const hears = await browser(MICROPHONE);
@@ -115,7 +115,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await one.page.locator(".notes .voice").click();
     await one.page.locator(".notes .voice.recording", { hasText: "End 0:02" }).waitFor();
     await one.page.locator(".notes .voice").click();
-    // The length depends on this machine; the test waited for two seconds.
+    // The recording's length depends on this machine. The test waited for two seconds.
     const line = other.page.locator(".notes li", { hasText: /voice, \d+ s/ });
     await line.waitFor();
     const seconds = Number(/voice, (\d+) s/.exec(await line.innerText())[1]);
@@ -161,7 +161,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     const emulator = spawn(BIN, ["emulate", SCENE, "--out", out], { stdio: ["ignore", "pipe", "ignore"] });
     running.add(emulator);
     const vehicle = join(out, "vehicle.toml");
-    // Its last line names the devices' ports. By then all are open and the vehicle file is written.
+    // The emulator prints the devices' ports last. By then all ports are open and the vehicle file is written.
     await once(emulator.stdout, "data");
     const { child, url } = await start(folder, await freePort(), "run", vehicle);
     const { page, context, problems } = await open(chromium, url);

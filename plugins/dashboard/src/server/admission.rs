@@ -1,4 +1,4 @@
-//! Rights of requests by their tokens.
+//! Decides by its tokens whether a request may see the dive, and with which role.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -16,11 +16,11 @@ use super::places::Place;
 use super::reply::{ask_to_wait, plain, refused};
 use crate::access::{Role, tokens_of};
 
-/// Number of wrong tokens that are remembered, in total and for a client.
+/// Maximum number of wrong tokens remembered, in total and per client.
 const MOST_WRONG: usize = 256;
 const MOST_WRONG_OF_CLIENT: usize = 4;
 
-/// Connection of a request.
+/// Connection that a request arrived on.
 #[derive(Clone)]
 pub(super) struct Caller {
     pub(super) peer: IpAddr,
@@ -32,16 +32,16 @@ pub(super) struct Admitted {
     pub(super) role: Role,
     pub(super) client: Client,
     place: Arc<Place>,
-    /// Whether the address comes from a declared proxy.
+    /// Whether a declared proxy has forwarded the request.
     is_forwarded: bool,
 }
 
 /// Reason why a request may not see the dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Denied {
-    /// No token, or no right one.
+    /// The request has no token, or only wrong ones.
     NoToken,
-    /// Too many wrong tokens came from its address, so the token isn't compared.
+    /// The client has sent too many wrong tokens, so its token isn't compared.
     Spent,
 }
 
@@ -53,7 +53,7 @@ impl Denied {
         }
     }
 
-    /// The refusal as an answer to a command.
+    /// Returns the refusal as an answer to a command.
     pub(super) fn refusal(self, shared: &Shared) -> Response {
         refused(shared, self.status(), self.why().trim_end())
     }
@@ -82,7 +82,7 @@ impl FromRequestParts<Arc<Shared>> for Admitted {
 }
 
 impl Admitted {
-    /// Admits a request by these tokens of it.
+    /// Admits a request that carries these tokens.
     pub(super) fn of_tokens(
         shared: &Shared,
         caller: &Caller,
@@ -97,14 +97,16 @@ impl Admitted {
         Ok(Self { role, client, place: Arc::clone(&caller.place), is_forwarded })
     }
 
-    /// Whether its connection may carry a stream of the feed. If so, it counts as a stream from now on.
+    /// Registers the connection as a stream of the feed. Returns `false` if there are too many streams.
     pub(super) fn may_stream(&self) -> bool {
         self.place.stream(self.client, self.is_forwarded)
     }
 }
 
-/// Hashes of clients' wrong tokens, the latest last. A repeated token is no guess, so old tokens in a browser's tabs
-/// don't spend the budget of its address.
+/// Hashes of wrong tokens by client, the latest last.
+///
+/// A repeated wrong token isn't a new guess. Old tokens in a browser's tabs therefore don't exhaust the budget of
+/// their address.
 #[derive(Default)]
 pub(super) struct WrongTokens(Mutex<VecDeque<(Client, u64)>>);
 
@@ -137,8 +139,10 @@ fn hash_of(token: &str) -> u64 {
 }
 
 impl Shared {
-    /// Role of these tokens. Each wrong one costs a guess of the client's budget. Tokens that the client has shown
-    /// before are free: a right one on this connection, or one of its last wrong ones.
+    /// Returns the highest role among these tokens.
+    ///
+    /// Each wrong token uses one guess of the client's budget. Two kinds of tokens are free: a right token already
+    /// shown on this connection, and a wrong token that is still remembered.
     fn role(&self, client: Client, place: &Place, tokens: &BTreeSet<String>) -> Result<Role, Denied> {
         if self.access.tokens.is_none() {
             return Ok(Role::Operator);

@@ -1,4 +1,4 @@
-//! Answers to requests. None waits for the loop.
+//! Answers HTTP requests, without waiting for the loop.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -27,13 +27,13 @@ use crate::model::{Body, MOST_IN_RANGE, Message, Sort};
 
 /// The feed's WebSocket subprotocol.
 const SUBPROTOCOL: &str = "headrace.feed.1";
-/// Longest message that is read, bytes.
+/// Maximum length of a message that is read, bytes.
 const LONGEST_READ: usize = 16 << 10;
-/// Lifetime of the token in a browser, seconds: a day.
+/// Lifetime of the token's cookie in a browser, seconds: a day.
 const COOKIE_S: u32 = 86_400;
 const TOO_MANY_STREAMS: &str = "too many viewers, or too many from this address\n";
 
-/// Routes of all addresses.
+/// Returns the routes of the server.
 pub(super) fn router(shared: Arc<Shared>) -> Router {
     Router::new()
         .route("/", get(page))
@@ -57,7 +57,7 @@ pub(super) fn router(shared: Arc<Shared>) -> Router {
         .with_state(shared)
 }
 
-/// Refuses other hosts and origins, and adds security headers to the answer.
+/// Refuses unknown hosts and origins, and adds security headers to every answer.
 async fn guard(State(shared): Here, request: Request, next: Next) -> Response {
     let (headers, uri) = (request.headers(), request.uri());
     let frame_ancestors = ancestors(&shared, headers);
@@ -85,7 +85,7 @@ async fn guard(State(shared): Here, request: Request, next: Next) -> Response {
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_str(&policy).unwrap_or(fixed("default-src 'none'")),
     );
-    // Voice notes may be recorded by this page, but not by pages that frame it or that it frames.
+    // This page may record voice notes. Pages in frames around or inside it may not.
     set.insert(HeaderName::from_static("permissions-policy"), fixed("microphone=(self)"));
     set.insert(header::X_CONTENT_TYPE_OPTIONS, fixed("nosniff"));
     set.insert(header::REFERRER_POLICY, fixed("no-referrer"));
@@ -94,7 +94,8 @@ async fn guard(State(shared): Here, request: Request, next: Next) -> Response {
     answer
 }
 
-/// Origins that may frame the page: other services of this machine, such as Cockpit, and declared ones.
+/// Returns the origins that may frame the page: other services of this machine, such as Cockpit, and declared
+/// origins.
 fn ancestors(shared: &Shared, headers: &HeaderMap) -> String {
     let mut all = "'self'".to_owned();
     let name = headers.get(header::HOST).and_then(|host| host.to_str().ok()).map(name_of);
@@ -113,7 +114,9 @@ async fn missing() -> Response {
     plain(StatusCode::NOT_FOUND, "no such page\n")
 }
 
-/// The page, for anyone. It asks for the token itself, because frames with another status are retried for ever.
+/// Returns the page to any client, without a token.
+///
+/// The page itself asks for the token. Programs that frame the page would retry any other status for ever.
 async fn page() -> Response {
     ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], assets::index()).into_response()
 }
@@ -129,9 +132,9 @@ async fn asset(Path(path): Path<String>) -> Response {
     }
 }
 
-/// Accepts a token, and stores it in the browser.
+/// Checks a token, and stores it in the browser as a cookie.
 ///
-/// The cookie that the browser sends with it is an old one and is ignored.
+/// A cookie sent with this request is an old one and is ignored.
 async fn login(State(shared): Here, caller: Extension<Caller>, headers: HeaderMap, uri: Uri) -> Response {
     let home = [(header::LOCATION, "/")];
     if shared.access.tokens.is_none() {
@@ -167,7 +170,7 @@ async fn socket(
     upgrade.on_upgrade(move |socket| feed::serve(socket, shared, role, resume))
 }
 
-/// The feed's texts, one per line, with one state a second.
+/// Streams the feed's texts, one per line, with one state a second.
 async fn lines(State(shared): Here, admitted: Admitted) -> Response {
     let Some(batches) = shared.fan().as_ref().map(tokio::sync::broadcast::Sender::subscribe) else {
         return plain(StatusCode::SERVICE_UNAVAILABLE, "the dive has ended\n");
@@ -244,7 +247,7 @@ async fn extras(State(shared): Here, headers: HeaderMap) -> Response {
     json_answer(&neighbours::extras(&format!("{scheme}://{host}")))
 }
 
-/// Headers that allow a declared page to read the answer.
+/// Returns the headers that allow a page from a declared origin to read the answer.
 fn allowed(shared: &Shared, headers: &HeaderMap) -> HeaderMap {
     let mut set = HeaderMap::new();
     let Some(origin) = headers.get(header::ORIGIN) else { return set };
@@ -264,7 +267,7 @@ async fn preflight(State(shared): Here, headers: HeaderMap) -> Response {
     (StatusCode::NO_CONTENT, allowed(&shared, &headers)).into_response()
 }
 
-/// Acknowledge, silence, mark and note, as sent by a joystick's buttons.
+/// Runs an action that a joystick's button sends: acknowledge, silence, mark or note.
 async fn action(
     State(shared): Here,
     Path(name): Path<String>,

@@ -1,4 +1,4 @@
-//! Rate limits of requests: a burst, and a refill per second.
+//! Rate limits of requests. A budget allows a burst, and refills at a constant rate.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -7,17 +7,17 @@ use tokio::time::Instant;
 
 use super::client::Client;
 
-/// Number of clients that a budget remembers. A table of this size takes about 200 KiB.
+/// Maximum number of clients in a table of budgets. A full table takes about 200 KiB.
 const MOST_CLIENTS: usize = 4096;
 
-/// Size of a budget, and its refill per second.
+/// Maximum of a budget, and refill per second.
 #[derive(Debug, Clone, Copy)]
 struct Rate {
     most: f64,
     per_s: f64,
 }
 
-/// Remaining budget, and its time.
+/// Remaining budget at a time.
 #[derive(Debug, Clone, Copy)]
 struct Left(f64, Instant);
 
@@ -27,7 +27,7 @@ impl Left {
     }
 }
 
-/// A budget shared by all.
+/// A budget that all clients share.
 pub(crate) struct Budget {
     rate: Rate,
     left: Mutex<Option<Left>>,
@@ -38,7 +38,7 @@ impl Budget {
         Self { rate: Rate { most, per_s }, left: Mutex::new(None) }
     }
 
-    /// Takes one if available.
+    /// Takes one request from the budget. Returns `false` if the budget is exhausted.
     pub(crate) fn take(&self) -> bool {
         let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
         let now = Instant::now();
@@ -60,7 +60,7 @@ impl Budgets {
         Self { rate: Rate { most, per_s }, left: Mutex::default() }
     }
 
-    /// Takes `count` from a client's budget if all are available; otherwise takes none.
+    /// Takes `count` requests from a client's budget. If fewer are left, takes none and returns `false`.
     pub(crate) fn take(&self, client: Client, count: usize) -> bool {
         if count == 0 {
             return true;
@@ -88,7 +88,7 @@ impl Budgets {
     }
 }
 
-/// Makes room in a full table: removes clients with a full budget, or else the one with the most left.
+/// Makes room in a full table. Removes all clients with a full budget, or else the client with the largest one.
 fn forget_one(left: &mut BTreeMap<Client, Left>, rate: Rate, now: Instant) {
     left.retain(|_, left| left.now(rate, now) < rate.most);
     if left.len() >= MOST_CLIENTS {
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn full_table_keeps_spent_budgets() {
+    fn full_table_keeps_exhausted_budgets() {
         let budgets = Budgets::new(20.0, 0.0);
         assert!(budgets.take(client(0), 20));
         for number in 1..2 * u32::try_from(MOST_CLIENTS).unwrap() {

@@ -1,14 +1,16 @@
-//! Clients by address, as counted by rate limits.
+//! Clients by address, as rate limits count them.
 
 use std::net::{IpAddr, Ipv6Addr};
 
 use axum::http::{HeaderMap, HeaderName};
 
-/// Addresses that a request has passed, the nearest last; each proxy appends the previous one.
+/// Header with the addresses that a request has passed. Each proxy appends the address that it received the request
+/// from.
 const FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 
-/// Address counted by limits: an IPv4 address, or the first half of an IPv6 address, because a machine has many of
-/// those.
+/// Address by which limits count a client.
+///
+/// For IPv6 only the first half counts, because one machine has many addresses with the same first half.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Client(IpAddr);
 
@@ -20,7 +22,8 @@ impl Client {
         })
     }
 
-    /// Behind a declared proxy the forwarded address, otherwise the connection's own.
+    /// Returns the client that sent a request: the forwarded address behind a declared proxy, otherwise the peer's
+    /// address.
     pub(super) fn of_request(peer: IpAddr, proxies: &[IpAddr], headers: &HeaderMap) -> Self {
         let is_proxy = |address: &IpAddr| proxies.contains(&address.to_canonical());
         if !is_proxy(&peer) {
@@ -28,7 +31,7 @@ impl Client {
         }
         let lines = headers.get_all(FORWARDED_FOR).iter().filter_map(|line| line.to_str().ok());
         let passed: Vec<_> = lines.flat_map(|line| line.split(',')).collect();
-        // Only declared proxies are trusted; addresses further left may be forged.
+        // Only declared proxies are trusted. Addresses to the left of the last untrusted one may be forged.
         let addresses = passed.iter().rev().map_while(|text| text.trim().parse::<IpAddr>().ok());
         Self::of_address(addresses.into_iter().find(|address| !is_proxy(address)).unwrap_or(peer))
     }

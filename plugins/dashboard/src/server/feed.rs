@@ -1,4 +1,4 @@
-//! A viewer on the WebSocket.
+//! Serves one viewer of the feed over a WebSocket.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -18,18 +18,19 @@ use crate::command::{Asked, Command, LONGEST};
 use crate::model::{Body, Message, Sort};
 use crate::site::May;
 
-/// Interval of pings, counted from the last answer, and the timeout of an answer. A stalled viewer is dropped within
-/// [`STALLED_AFTER`], however much of the feed its machine buffers unread.
+/// Interval of pings, from the last answer, and timeout of an answer.
+///
+/// Together they drop a stalled viewer within [`STALLED_AFTER`], even if its machine buffers the feed unread.
 const PING_EVERY: Duration = Duration::from_secs(2);
 const ANSWERS_WITHIN: Duration = Duration::from_secs(8);
-/// A viewer that reads a long message more slowly than this is dropped, bytes a second.
+/// Minimum speed at which a viewer must read a long message, bytes per second. Slower viewers are dropped.
 const SLOWEST_PER_S: f64 = 20_000.0;
-/// Number of messages read from a viewer after its connection was closed with a reason.
+/// Maximum number of messages read from a viewer after the server has closed the connection.
 const MOST_AFTER_CLOSE: usize = 64;
-/// Limit of messages a second from a viewer.
+/// Maximum rate of messages from a viewer, per second.
 pub(super) const MOST_PER_S: f64 = 20.0;
 
-/// Position of a viewer when its connection was lost.
+/// Last message that a viewer received before it lost its connection.
 pub(super) struct Resume {
     pub(super) instance: String,
     pub(super) since: u64,
@@ -52,13 +53,13 @@ impl Drop for Counted {
     }
 }
 
-/// Reason why a viewer is no longer served.
+/// Reason why the server stops serving a viewer.
 enum Over {
-    /// It has disconnected.
+    /// The viewer has disconnected.
     Gone,
-    /// It accepts no data.
+    /// The viewer accepts no data.
     Stalled,
-    /// It sent something that isn't allowed.
+    /// The viewer sent a message that isn't allowed.
     Refused,
     /// The page ends.
     Ended,
@@ -69,14 +70,14 @@ struct Viewer {
     shared: Arc<Shared>,
     may: May,
     instance: String,
-    /// Last message sent to it.
+    /// Number of the last message sent to the viewer.
     seq: u64,
     state_every: Duration,
     state_sent: Option<Instant>,
     budget: Budget,
     /// Time of the next ping.
     ping_at: Instant,
-    /// Deadline of the answer to the last ping.
+    /// Deadline for the answer to the last ping; `None` if no answer is due.
     answer_by: Option<Instant>,
 }
 
@@ -107,8 +108,8 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         Over::Ended => (close_code::AWAY, "ended"),
     };
     let close = Frame::Close(Some(CloseFrame { code, reason: reason.into() }));
-    // It may be gone already. Otherwise its answer is awaited, so that it reads all data sent before. A flooding
-    // client isn't read any more.
+    // The viewer may already have disconnected. Otherwise wait for its answer, so that it reads all data sent before.
+    // The number of messages read is limited, because a client may flood the server.
     let _closed = timeout(Duration::from_millis(500), async {
         if viewer.socket.send(close).await.is_ok() {
             for _ in 0..MOST_AFTER_CLOSE {
@@ -121,7 +122,7 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
     .await;
 }
 
-/// Rights of a role in this dive.
+/// Returns the rights of a role in this dive.
 pub(super) fn may(shared: &Shared, role: Role) -> May {
     let model = shared.model();
     let operates = role == Role::Operator;
@@ -131,7 +132,7 @@ pub(super) fn may(shared: &Shared, role: Role) -> May {
 impl Viewer {
     async fn watch(&mut self) -> Over {
         loop {
-            // Subscribed under the model's lock, so that nothing is missed or sent twice.
+            // Subscribe under the model's lock, so that no message is missed or sent twice.
             let (messages, mut batches, instance) = {
                 let model = self.shared.model();
                 let Some(batches) = self.shared.fan().as_ref().map(tokio::sync::broadcast::Sender::subscribe)
@@ -195,7 +196,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Whether a state is due for it.
+    /// Whether the viewer's requested rate allows another state now.
     fn wants_state(&mut self) -> bool {
         let now = Instant::now();
         let is_due = self.state_sent.is_none_or(|sent| now.duration_since(sent) >= self.state_every);
@@ -221,7 +222,8 @@ impl Viewer {
         let within = STALLED_AFTER + Duration::from_secs_f64(bytes as f64 / SLOWEST_PER_S);
         match timeout(within, self.socket.send(frame)).await {
             Ok(Ok(())) => {
-                // Answers aren't read meanwhile, and data buffered by a slow line comes before them.
+                // The server reads no answers while it sends. A slow line delivers buffered data before an answer, so
+                // the deadline is extended.
                 self.answer_by = self.answer_by.map(|by| by + began.elapsed());
                 Ok(())
             }
@@ -284,7 +286,7 @@ impl Viewer {
     fn obey(&mut self, text: &str) -> Result<&'static str, String> {
         match Asked::parse(text)? {
             Asked::Rate(hz) => {
-                // Slightly less, so that regular updates aren't missed by a small margin.
+                // Slightly shorter than the period, so that jitter of regular states doesn't skip one.
                 self.state_every = Duration::from_secs_f64((0.9 / hz).max(0.0));
                 Ok("rate")
             }
@@ -307,7 +309,7 @@ impl Viewer {
         }
     }
 
-    /// Refuses a message that no page of this program sends, and ends the connection.
+    /// Refuses a message that this program's page never sends, and ends the connection.
     async fn refuse(&mut self, why: &str) -> Result<(), Over> {
         Shared::count(&self.shared.counts.refused, 1);
         self.answer(&json!({"type": "refused", "seq": self.seq, "why": why})).await?;

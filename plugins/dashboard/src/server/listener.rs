@@ -1,4 +1,4 @@
-//! Connections: accepted at once, with TLS if there is a certificate, and closed if no request arrives in time.
+//! Accepts connections at once, with TLS if there is a certificate. A connection without a request in time is closed.
 
 use std::io;
 use std::net::SocketAddr;
@@ -18,33 +18,34 @@ use super::client::Client;
 use super::stall::Stream;
 use super::{Shared, TlsFiles, answers};
 
-/// Pause after a connection couldn't be accepted.
+/// Pause after a failure to accept a connection.
 const PAUSE: Duration = Duration::from_millis(100);
-/// Timeout of a request's head: a silent, half-sent or idle connection is closed.
+/// Timeout for the head of a request. Silent and idle connections are closed, and so are unfinished requests.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// Timeout of a TLS handshake.
 #[cfg(feature = "tls")]
 const HANDSHAKE_WITHIN: Duration = Duration::from_secs(5);
-/// Send buffer of a connection in the kernel, bytes; the kernel uses as much again for itself. Its default of
-/// megabytes would hide for a minute that a viewer reads nothing.
-const SEND_BUFFER: u32 = 32 << 10;
-/// Buffer of a connection in this program, bytes.
+/// Size of a connection's send buffer in the kernel, bytes; the kernel adds as much again for itself.
 ///
-/// It holds the longest head of a request, and the part of an answer that waits to be sent.
+/// The default of some megabytes would hide for a minute that a viewer reads nothing.
+const SEND_BUFFER: u32 = 32 << 10;
+/// Size of a connection's buffer in this program, bytes.
+///
+/// The buffer holds the longest head of a request, and the part of an answer that waits to be sent.
 const HELD: usize = 64 << 10;
-/// Number of connections that the kernel holds until they are accepted.
+/// Maximum number of connections that wait in the kernel to be accepted.
 const BACKLOG: u32 = 1024;
 
-/// Certificate and key.
+/// TLS configuration from a certificate and its key.
 pub(super) struct Tls {
     #[cfg(feature = "tls")]
     acceptor: tokio_rustls::TlsAcceptor,
 }
 
 impl Tls {
-    /// Reads certificate and key.
+    /// Reads a certificate and its key.
     ///
-    /// Errors: the file and its fault.
+    /// Errors: always, because this program was built without TLS.
     #[cfg(not(feature = "tls"))]
     pub(super) fn read(files: &TlsFiles) -> Result<Self, String> {
         let path = files.certificate.display();
@@ -53,9 +54,9 @@ impl Tls {
         ))
     }
 
-    /// Reads certificate and key.
+    /// Reads a certificate and its key.
     ///
-    /// Errors: the file and its fault.
+    /// Errors: the file and the reason.
     #[cfg(feature = "tls")]
     pub(super) fn read(files: &TlsFiles) -> Result<Self, String> {
         use tokio_rustls::rustls::pki_types::pem::PemObject as _;
@@ -88,23 +89,23 @@ impl Tls {
 /// Errors: those of the system.
 pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
-    // As the standard library does: on other systems it would let two programs share a port.
+    // Set on Unix only, as in the standard library. On other systems the option would let two programs share a port.
     #[cfg(unix)]
     socket.set_reuseaddr(true)?;
-    // Accepted connections inherit it.
+    // Accepted connections inherit this size.
     socket.set_send_buffer_size(SEND_BUFFER)?;
     socket.bind(address)?;
     socket.listen(BACKLOG)
 }
 
-/// Accepts connections until it is aborted.
+/// Accepts connections until the task is aborted.
 pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<Shared>) {
     let app = App::new(answers::router(Arc::clone(&shared)));
     let tls = tls.map(Arc::new);
     loop {
         match listener.accept().await {
             Ok((tcp, from)) => {
-                // Small messages must be sent at once.
+                // Without this option TCP would delay small messages.
                 if let Err(error) = tcp.set_nodelay(true) {
                     tracing::debug!(%error, "a connection of the page delays small messages");
                 }
@@ -117,14 +118,14 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
                 tokio::time::sleep(PAUSE).await;
             }
         }
-        // Each connection gets its turn before enough others arrive to take its place.
+        // Let each new connection run before enough others arrive to take its place.
         tokio::task::yield_now().await;
     }
 }
 
 type App = TowerToHyperService<axum::Router>;
 
-/// Serves a connection until it ends or loses its place.
+/// Serves a connection until it ends or its place is taken away.
 async fn serve(tcp: TcpStream, caller: Caller, app: App, tls: Option<Arc<Tls>>, shared: Arc<Shared>) {
     let place = Arc::clone(&caller.place);
     let stream = Stream::new(tcp, Arc::clone(&place), shared);
@@ -147,7 +148,7 @@ async fn serve(tcp: TcpStream, caller: Caller, app: App, tls: Option<Arc<Tls>>, 
     }
 }
 
-/// Answers the requests of a connection.
+/// Answers the requests on a connection.
 async fn answer(stream: impl AsyncRead + AsyncWrite + Send + Unpin + 'static, caller: Caller, app: App) {
     let service = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(caller.clone());

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::Shared;
 
-/// The metrics in Prometheus' text format.
+/// Returns the metrics in Prometheus' text format.
 pub(super) fn metrics(shared: &Shared) -> String {
     let model = shared.model();
     let counts = &shared.counts;

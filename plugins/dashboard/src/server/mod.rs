@@ -1,4 +1,4 @@
-//! The server: one thread with sockets and timers. In a live dive the loop's thread never waits for it.
+//! The page's server: one thread with sockets and timers. In a live dive the loop never waits for it.
 
 #![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
 
@@ -35,41 +35,41 @@ use crate::fed::Fed;
 use crate::model::{Message, Model};
 use crate::site::Site;
 
-/// Default port.
+/// Default port of the page.
 pub const PORT: u16 = 8881;
-/// Number of ports that are tried, starting with the requested one.
+/// Number of ports tried, beginning with the requested port.
 const PORTS: u16 = 10;
-/// Number of batches that a viewer may be behind before it gets all changes at once.
+/// Maximum number of batches that a viewer may lag behind. Beyond that it gets all changes at once.
 const BATCHES: usize = 64;
-/// Budget of wrong tokens of a client, in a burst and per second.
+/// Budget of wrong tokens for a client: burst, and refill per second.
 const MOST_GUESSES: f64 = 20.0;
 const GUESSES_PER_S: f64 = 1.0;
-/// Time in which viewers get the last messages.
+/// Time for viewers to receive the last messages.
 const ENDS_WITHIN: Duration = Duration::from_secs(1);
 
-/// Certificate and key as PEM files.
+/// Files with certificate and key, in PEM format.
 #[derive(Debug, Clone)]
 pub struct TlsFiles {
-    /// The certificate with its intermediate certificates.
+    /// File with the certificate and its intermediate certificates.
     pub certificate: std::path::PathBuf,
-    /// Its private key.
+    /// File with the certificate's private key.
     pub key: std::path::PathBuf,
 }
 
 /// Address and access rules of the page.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Address and port; port 0 is any free port.
+    /// Address and port. Port 0 selects any free port.
     pub address: SocketAddr,
-    /// Tokens; `None` on loopback.
+    /// Tokens; `None` on loopback, where no token is needed.
     pub tokens: Option<Tokens>,
-    /// Names of this machine.
+    /// Names of this machine, in addition to its addresses and `localhost`.
     pub hosts: Vec<String>,
-    /// Origins of pages that may frame this one and send actions.
+    /// Origins of pages that may frame this page and send actions.
     pub origins: Vec<String>,
     /// Proxies whose `X-Forwarded-For` is trusted.
     pub proxies: Vec<IpAddr>,
-    /// Certificate and key.
+    /// Certificate and key; `None` serves plain HTTP.
     pub tls: Option<TlsFiles>,
 }
 
@@ -82,7 +82,7 @@ pub enum PageError {
     Bind {
         /// Requested address.
         address: SocketAddr,
-        /// Reason.
+        /// Error of the last attempt.
         source: io::Error,
     },
     /// The thread or runtime can't be started.
@@ -93,29 +93,30 @@ pub enum PageError {
     Tls(String),
 }
 
-/// Handler of operators' commands; its error is the reason of a refusal.
+/// Handler of operators' commands. Its error is the reason of a refusal.
 pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
-/// Handler that logs the recording of a voice note and then notifies the loop; its error is the reason of a refusal.
+/// Handler that logs the recording of a voice note and then notifies the loop. Its error is the reason of a refusal.
 pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
-/// Finds the recording of the note with this id and time (seconds) in a log; `None` without a readable one. It may
-/// take seconds.
+/// Finds in a log the recording of the note with this id and time, seconds.
+///
+/// Returns `None` if the log has no readable recording of it. The search may take seconds.
 pub type Recall = Arc<dyn Fn(u32, f64) -> Result<Option<Voice>, String> + Send + Sync>;
 
-/// Storage of voice recordings.
+/// Source and destination of voice recordings.
 #[derive(Clone)]
 pub enum Voices {
-    /// None.
+    /// Recordings are not available.
     None,
-    /// The log of a live dive.
+    /// Recordings are written to the log of a live dive.
     Kept(Keep),
-    /// A recorded log.
+    /// Recordings are read from a recorded log.
     Recalled(Recall),
 }
 
-/// Handler of playback commands.
+/// Handler of commands to playback.
 pub type Direct = Arc<dyn Fn(Play) -> Result<(), String> + Send + Sync>;
 
-/// Counters for `/metrics`.
+/// Counters that `/metrics` reports.
 #[derive(Debug, Default)]
 pub(crate) struct Counts {
     pub(crate) viewers: AtomicUsize,
@@ -132,7 +133,7 @@ pub(crate) struct Counts {
 pub(crate) struct Shared {
     model: Mutex<Model>,
     pub(crate) access: Access,
-    /// `None` once the page ends.
+    /// Sender of messages to all viewers; `None` once the page ends.
     fan: Mutex<Option<broadcast::Sender<Arc<[Message]>>>>,
     pub(crate) counts: Counts,
     pub(crate) act: Act,
@@ -141,10 +142,10 @@ pub(crate) struct Shared {
     pub(crate) is_tls: bool,
     proxies: Vec<IpAddr>,
     places: Arc<places::Places>,
-    /// Budget of wrong tokens of each client.
+    /// Budget of wrong tokens for each client.
     guesses: budget::Budgets,
     wrong_tokens: admission::WrongTokens,
-    /// Budget of actions by HTTP of each operator.
+    /// Budget of HTTP actions for each operator's address.
     actions: budget::Budgets,
     stop: Notify,
     has_ended: AtomicBool,
@@ -159,7 +160,7 @@ impl Shared {
         self.fan.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts a viewer that accepted no data for too long.
+    /// Counts a viewer that was dropped because it accepted no data.
     fn count_stalled(&self) {
         Self::count(&self.counts.stalled, 1);
         tracing::info!(
@@ -173,18 +174,18 @@ impl Shared {
     }
 }
 
-/// A page that is served.
+/// The page while it is being served.
 pub struct Page {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
     sender: mpsc::Sender<Fed>,
     address: SocketAddr,
-    /// Ports that were taken by other programs.
+    /// Tried ports that other programs use.
     taken: Vec<u16>,
 }
 
 impl Page {
-    /// Serves a dive. `instance` is its unique name.
+    /// Starts to serve a dive. `instance` is a unique name of this run.
     ///
     /// Errors: see [`PageError`].
     pub fn start(
@@ -231,22 +232,22 @@ impl Page {
         Ok(Self { shared, thread: Some(thread), sender, address, taken })
     }
 
-    /// Address of the page.
+    /// Returns the address of the page.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Ports before that one which other programs use.
+    /// Returns the tried ports that other programs use.
     pub fn taken(&self) -> &[u16] {
         &self.taken
     }
 
-    /// Its scheme, `http` or `https`.
+    /// Returns the scheme of the page's address, `http` or `https`.
     pub fn scheme(&self) -> &'static str {
         if self.shared.is_tls { "https" } else { "http" }
     }
 
-    /// Collector for a loop's results; `waits` is for a replay.
+    /// Returns a collector for a loop's results; `waits` is true for a replay.
     pub fn collector(&self, dive: &Loop, waits: bool) -> Collector {
         let (is_playback, recorded_to, compared_m) = {
             let model = self.shared.model();
@@ -256,15 +257,15 @@ impl Page {
         Collector::new(self.sender.clone(), dive, waits, is_playback, recorded_to).compared_with(compared_m)
     }
 
-    /// Number of viewers.
+    /// Returns the number of connected viewers.
     pub fn viewers(&self) -> usize {
         self.shared.counts.viewers.load(Ordering::Relaxed)
     }
 
-    /// Ends the page. Viewers get the last messages, with `end` as the very last, within a second.
+    /// Ends the page. Within a second, viewers get the last messages, and `end` after all others.
     pub fn end(mut self, end: Option<serde_json::Value>) {
         if let Some(end) = end {
-            // Its thread may have ended early, which is reported below.
+            // Sending fails if the page's thread has ended early, which `stop` reports.
             let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
         }
         self.stop();
@@ -287,7 +288,7 @@ impl Drop for Page {
     }
 }
 
-/// The first free port from the requested one, and the taken ones before it.
+/// Listens on the first free port, beginning with the requested one. Also returns the ports in use before it.
 fn bind(asked: SocketAddr) -> Result<(TcpListener, Vec<u16>), PageError> {
     let mut taken = Vec::new();
     let mut failed = io::Error::other("no port");
@@ -313,7 +314,7 @@ async fn serve(
 ) {
     let pump = pump::pump(fed, Arc::clone(&shared));
     let serving = tokio::spawn(listener::accept(listener, tls, Arc::clone(&shared)));
-    // Ends when the page is to end.
+    // The pump returns when the page is to end.
     pump.await;
     drop(shared.fan().take());
     let gone = async {

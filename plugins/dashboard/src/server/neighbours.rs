@@ -1,13 +1,13 @@
-//! Requests of BlueOS and Cockpit. They are answered without a token, and reveal nothing of the dive.
+//! Answers to requests of BlueOS and Cockpit. They need no token, and contain nothing about the dive.
 
 use serde_json::{Value, json};
 
-/// Path at which Cockpit finds widgets and actions.
+/// Path at which Cockpit looks for widgets and actions.
 pub(super) const EXTRAS: &str = "/cockpit_extras.json";
 /// Name of the service's icon in Material Design Icons, for BlueOS.
 const ICON: &str = "mdi-tunnel";
 
-/// The service as listed by BlueOS.
+/// Returns the description of this service that BlueOS lists.
 pub(super) fn service() -> Value {
     json!({
         "name": "headrace",
@@ -23,9 +23,9 @@ pub(super) fn service() -> Value {
     })
 }
 
-/// Widgets, actions and joystick buttons for Cockpit. `base` is this server's address as seen by the browser.
+/// Returns widgets, actions and joystick buttons for Cockpit. `base` is this server's address as seen by the browser.
 pub(super) fn extras(base: &str) -> Value {
-    // Cockpit shows a picture, not a named icon. Its field is now `iconUrl`, and was `iframeIcon` before.
+    // Cockpit shows an image file, not a named icon. Newer versions read `iconUrl`, older ones `iframeIcon`.
     let icon = format!("{base}/assets/icon.svg");
     let widget = |name: &str, path: &str| {
         json!({"name": name, "iframeUrl": format!("{base}/widget/{path}"), "iconUrl": icon, "iframeIcon": icon,

@@ -1,7 +1,7 @@
-//! Places for connections in three classes: without a token, viewers, and operators.
+//! Limits the number of connections, in three classes: without a token, viewers, and operators.
 //!
-//! Each class has its own number of places, so that none takes another's. In a full class the oldest connection
-//! without a stream is closed for the newest one. So idle connections can't keep anybody out.
+//! Each class has its own number of places, so that a full class doesn't affect the others. In a full class a new
+//! connection replaces the oldest connection without a stream. Idle connections therefore can't keep anybody out.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,14 +11,14 @@ use tokio::sync::Notify;
 use super::client::Client;
 use crate::access::Role;
 
-/// Number of connections of a class. A browser opens up to six.
+/// Maximum number of connections in a class. A browser opens up to six.
 pub(super) const MOST_OF_CLASS: usize = 64;
-/// Number of feed streams of each token.
+/// Maximum number of feed streams in a class.
 pub(super) const MOST_STREAMS: usize = 32;
-/// Number of streams of an address behind a declared proxy: Cockpit's three widgets and the page, twice.
+/// Maximum number of streams from an address behind a declared proxy: Cockpit's three widgets and the page, twice.
 const MOST_STREAMS_FORWARDED: usize = 8;
 
-/// Connections, the oldest first.
+/// Places of all connections, the oldest first.
 #[derive(Default)]
 pub(super) struct Places {
     held: Mutex<Vec<Held>>,
@@ -31,9 +31,9 @@ struct Held {
     stream: Option<Client>,
 }
 
-/// A connection's place, which is freed when this is dropped.
+/// A connection's place, which is freed on drop.
 pub(super) struct Place {
-    /// Tells the connection to close, and identifies it among the places.
+    /// Notifies the connection to close, and identifies its place.
     key: Arc<Notify>,
     places: Arc<Places>,
     shown: Mutex<Option<(Client, Role)>>,
@@ -54,7 +54,7 @@ impl Places {
     }
 }
 
-/// Closes a connection of a full class: the oldest without a stream, of the address with the most connections.
+/// If a class is full, closes its oldest connection without a stream, of the client with the most such connections.
 fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
     if held.iter().filter(|one| one.class == class).count() < MOST_OF_CLASS {
         return;
@@ -72,18 +72,18 @@ fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
 }
 
 impl Place {
-    /// Ends once the place is taken away.
+    /// Waits until the place is taken away.
     pub(super) async fn closed(&self) {
         self.key.notified().await;
     }
 
-    /// Role whose token this client has shown on this connection.
+    /// Returns the role that this client has proved by a token on this connection.
     pub(super) fn shown(&self, client: Client) -> Option<Role> {
         let shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
         shown.filter(|(by, _)| *by == client).map(|(_, role)| role)
     }
 
-    /// Moves the connection to the class of a role whose token the client has shown.
+    /// Moves the connection to the class of a role, after the client has shown the role's token.
     pub(super) fn promote(&self, client: Client, role: Role) {
         *self.shown.lock().unwrap_or_else(PoisonError::into_inner) = Some((client, role));
         let mut held = self.places.held();
@@ -94,7 +94,7 @@ impl Place {
         held.push(own);
     }
 
-    /// Whether the connection may carry a stream. If so, it counts as a stream from now on.
+    /// Registers the connection as a stream of the feed. Returns `false` if there are too many streams.
     pub(super) fn stream(&self, client: Client, is_forwarded: bool) -> bool {
         let mut held = self.places.held();
         let Some(at) = self.index(&held) else { return false };
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_connections_leave_viewers_and_operators_their_places() {
+    fn silent_connections_take_no_place_of_viewers_or_operators() {
         let places = Arc::new(Places::default());
         let of = |role| {
             let place = places.enter(client(1));
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn address_with_most_connections_loses_first() {
+    fn full_class_closes_a_connection_of_the_busiest_address() {
         let places = Arc::new(Places::default());
         let other = places.enter(client(2));
         let _many: Vec<_> = (0..1000).map(|_| places.enter(client(1))).collect();
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_of_viewers_leave_operators_theirs() {
+    fn viewer_streams_take_no_stream_of_operators() {
         let places = Arc::new(Places::default());
         let stream = |role, number, is_forwarded| {
             let place = places.enter(client(9));

@@ -1,4 +1,4 @@
-//! Takes messages of the loop, and sends each one, encoded once, to all viewers.
+//! Takes messages from the loop, encodes each one once and sends it to all viewers.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -11,9 +11,9 @@ use super::Shared;
 use crate::fed::Fed;
 use crate::model::Message;
 
-/// Least time between two batches without urgent data: five a second, with a tolerance for early updates.
+/// Minimum interval between batches without urgent data: five a second, with a tolerance for early updates.
 const BATCH_EVERY: Duration = Duration::from_millis(190);
-/// Interval of sending the state again if there is no new one, as in a paused replay.
+/// Interval at which the state is sent again if there is no new one, as in a paused replay.
 const AGAIN_AFTER: Duration = Duration::from_secs(2);
 
 /// Runs until the page ends.
@@ -54,12 +54,12 @@ pub(super) async fn pump(mut fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
             flush(&shared);
             return;
         }
-        // Viewers get their turn even while a replay feeds as fast as it can.
+        // Let viewers run even while a replay sends data as fast as it can.
         tokio::task::yield_now().await;
     }
 }
 
-/// Takes a message and those waiting behind it; returns whether one is urgent.
+/// Applies a message and all that wait behind it to the model. Returns whether one of them is urgent.
 fn take(one: Fed, fed: &mut mpsc::Receiver<Fed>, shared: &Shared) -> bool {
     let mut model = shared.model();
     let mut is_urgent = model.take(one);
@@ -73,7 +73,8 @@ fn take(one: Fed, fed: &mut mpsc::Receiver<Fed>, shared: &Shared) -> bool {
 }
 
 fn flush(shared: &Shared) {
-    // The lock is held while sending, so that a viewer that connects meanwhile gets either all or nothing of it.
+    // The lock is held until all messages are sent, so that a viewer that connects meanwhile gets either all or none
+    // of them.
     let mut model = shared.model();
     let messages = model.flush();
     send(shared, messages);
@@ -89,7 +90,7 @@ fn send(shared: &Shared, messages: Vec<Message>) {
     if !messages.is_empty()
         && let Some(fan) = &*shared.fan()
     {
-        // There may be no viewer.
+        // Sending fails if there is no viewer, which needs no action.
         let _nobody = fan.send(messages.into());
     }
 }

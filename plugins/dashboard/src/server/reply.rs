@@ -1,4 +1,4 @@
-//! Building blocks of answers.
+//! Helpers that build answers.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub(super) fn json_answer(value: &Value) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
 }
 
-/// Refuses a command with a reason.
+/// Returns the refusal of a command, with the reason.
 pub(super) fn refused(shared: &Shared, status: StatusCode, why: &str) -> Response {
     Shared::count(&shared.counts.refused, 1);
     let mut answer = json_answer(&json!({"type": "refused", "why": why}));
@@ -27,7 +27,7 @@ pub(super) fn refused(shared: &Shared, status: StatusCode, why: &str) -> Respons
     ask_to_wait(answer)
 }
 
-/// Adds the time of the next allowed request to an answer, for a client that has sent too many.
+/// Adds the header `Retry-After` to the answer for a client that has sent too many requests.
 pub(super) fn ask_to_wait(mut answer: Response) -> Response {
     if answer.status() == StatusCode::TOO_MANY_REQUESTS {
         answer.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("1"));

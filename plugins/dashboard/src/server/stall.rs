@@ -1,4 +1,4 @@
-//! A connection that fails once its peer has accepted no data for a while.
+//! A TCP stream that fails when its peer has accepted no data for a while.
 
 use std::io;
 use std::pin::Pin;
@@ -13,15 +13,15 @@ use tokio::time::{Sleep, sleep};
 use super::Shared;
 use super::places::Place;
 
-/// A peer that accepts no data for this long is dropped.
+/// Time without accepted data after which a peer is dropped.
 pub(super) const STALLED_AFTER: Duration = Duration::from_secs(10);
 
-/// A TCP stream whose writes fail once none has made progress for [`STALLED_AFTER`].
+/// A TCP stream whose writes fail after [`STALLED_AFTER`] without progress.
 pub(super) struct Stream {
     tcp: TcpStream,
     deadline: Option<Pin<Box<Sleep>>>,
     shared: Arc<Shared>,
-    /// Place held as long as the stream exists, also after it has become a WebSocket.
+    /// Place of the connection. It is held as long as the stream exists, even after an upgrade to a WebSocket.
     _place: Arc<Place>,
 }
 
@@ -30,7 +30,7 @@ impl Stream {
         Self { tcp, deadline: None, shared, _place: place }
     }
 
-    /// Result of a write; an error if it has waited too long.
+    /// Returns the result of a write, or a timeout error if no write has made progress for too long.
     fn limited<T>(&mut self, cx: &mut Context<'_>, written: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
         if written.is_ready() {
             self.deadline = None;

@@ -1,4 +1,4 @@
-//! The server over real sockets, with clients that flood it or guess tokens.
+//! Tests of the server over real sockets, with clients that flood it or guess tokens.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpStream};
@@ -15,7 +15,7 @@ use crate::site::Mode;
 const VIEWER: &str = "Authorization: Bearer viewer-0123456789\r\n";
 const OPERATOR: &str = "Authorization: Bearer operator-01234567\r\n";
 
-/// A page with tokens, and the number of commands that it has passed on.
+/// A page with tokens, and the number of commands that the page has passed on.
 struct Served {
     page: Page,
     commands: Arc<AtomicU32>,
@@ -67,7 +67,7 @@ impl Served {
         stream
     }
 
-    /// Sends a request on a new connection; returns status, head and body of the answer.
+    /// Sends a request on a new connection; returns status and head of the answer.
     fn ask(&self, request: &str, headers: &str, body: &str) -> (u16, String) {
         ask(&mut self.connect(), request, headers, body)
     }
@@ -76,7 +76,7 @@ impl Served {
         of(&self.page.shared.counts).load(Ordering::Relaxed)
     }
 
-    /// Sends all viewers this many bytes.
+    /// Sends a message of this many bytes to all viewers.
     fn feed(&self, bytes: usize) {
         let body = Body::Text(format!("{{\"type\":\"test\",\"text\":\"{}\"}}", "x".repeat(bytes)).into());
         let batch = vec![Message { seq: 1, sort: Sort::Other, body }];
@@ -84,12 +84,12 @@ impl Served {
     }
 }
 
-/// Sends a request on an open connection; returns status and head of the answer, and also reads its body.
+/// Sends a request on an open connection; returns status and head of the answer, and reads its body.
 fn ask(stream: &mut TcpStream, request: &str, headers: &str, body: &str) -> (u16, String) {
     let length = body.len();
     let text =
         format!("{request} HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}Content-Length: {length}\r\n\r\n{body}");
-    // The server may have closed the connection.
+    // The write fails if the server has closed the connection.
     if stream.write_all(text.as_bytes()).is_err() {
         return (0, String::new());
     }
@@ -111,7 +111,7 @@ fn answer(stream: &mut TcpStream) -> (u16, String) {
     (head.split(' ').nth(1).unwrap().parse().unwrap(), head)
 }
 
-/// Whether the other side has closed a connection; also reads the data that it sent.
+/// Whether the server has closed a connection. Reads and discards the data that the server sent.
 fn is_closed(stream: &mut TcpStream) -> bool {
     stream.set_nonblocking(true).unwrap();
     let mut bytes = [0; 4096];
@@ -140,7 +140,7 @@ fn operator_is_served_within_1_s_among_1000_connections() {
             2 => "GET /register_service HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".to_owned(),
             _ => format!("GET /feed.jsonl HTTP/1.1\r\nHost: 127.0.0.1\r\n{VIEWER}\r\n"),
         };
-        // It may already have been closed for a newer one.
+        // The server may already have closed this connection for a newer one.
         let _closed = stream.write_all(sent.as_bytes());
         others.push(stream);
         if number % 20 == 19 {
@@ -179,7 +179,7 @@ fn operator_is_served_within_1_s_while_1000_connections_a_second_are_opened() {
         let (mut longest, mut refused) = (Duration::ZERO, 0);
         for _ in 0..60 {
             let began = Instant::now();
-            // A connection closed for a newer one is reopened, as browsers do.
+            // Reconnect if the server has closed the connection for a newer one, as browsers do.
             while served.ask("GET /state.json", OPERATOR, "").0 != 200 {
                 refused += 1;
             }
@@ -189,7 +189,7 @@ fn operator_is_served_within_1_s_while_1000_connections_a_second_are_opened() {
         has_ended.store(true, Ordering::Relaxed);
         let opened = opened.load(Ordering::Relaxed);
         println!(
-            "while {opened} connections were opened an operator waited {longest:?} at most, {refused} times asked again"
+            "while {opened} connections were opened an operator waited {longest:?} at most, and repeated {refused} requests"
         );
         assert!(longest < Duration::from_secs(1), "{longest:?}");
     });
@@ -212,12 +212,12 @@ fn silent_half_sent_and_idle_connections_are_closed_after_10_s() {
         std::thread::sleep(Duration::from_millis(50));
     }
     all[3].set_nonblocking(false).unwrap();
-    assert!(matches!(answer(&mut all[3]).0, 0 | 408), "half an action is answered");
+    assert!(matches!(answer(&mut all[3]).0, 0 | 408), "an unfinished action gets no answer or 408");
     assert_eq!(served.commands.load(Ordering::Relaxed), 0);
 }
 
 #[test]
-fn unread_streams_are_dropped_10_s_after_nothing_is_taken() {
+fn unread_streams_are_dropped_after_10_s_without_progress() {
     let served = served(&[]);
     let mut unread = [served.connect(), served.connect()];
     let lines = format!("GET /feed.jsonl HTTP/1.1\r\nHost: 127.0.0.1\r\n{VIEWER}\r\n");
@@ -226,7 +226,7 @@ fn unread_streams_are_dropped_10_s_after_nothing_is_taken() {
     let began = Instant::now();
     let mut dropped = Vec::new();
     while dropped.len() < 2 && began.elapsed() < Duration::from_secs(40) {
-        // About the feed of a dive with four heads.
+        // About the data rate of a dive with four heads.
         served.feed(4400);
         std::thread::sleep(Duration::from_millis(200));
         while (dropped.len() as u64) < served.count(|counts| &counts.stalled) {
@@ -242,14 +242,14 @@ fn unread_streams_are_dropped_10_s_after_nothing_is_taken() {
 }
 
 #[test]
-fn samples_have_one_content_type() {
+fn samples_answer_has_one_content_type() {
     let (status, head) = served(&[]).ask("GET /samples?from_m=0&to_m=1", VIEWER, "");
     assert_eq!((status, head.matches("content-type:").count()), (200, 1), "{head}");
     assert!(head.contains("content-type: application/octet-stream"), "{head}");
 }
 
 #[test]
-fn wrong_tokens_share_one_budget_in_any_header() {
+fn wrong_tokens_in_all_headers_share_one_budget() {
     let served = served(&[]);
     let mut right = served.connect();
     assert_eq!(ask(&mut right, "GET /state.json", OPERATOR, "").0, 200);
@@ -281,13 +281,17 @@ fn wrong_tokens_share_one_budget_in_any_header() {
     assert!(spent("GET /state.json", OPERATOR), "a right token isn't compared");
     assert_eq!(served.ask("GET /", bearer, "").0, 200, "the page itself needs none");
     assert_eq!(ask(&mut right, "GET /state.json", OPERATOR, "").0, 200, "its connection has shown it before");
-    assert_ne!(ask(&mut right, "GET /state.json", VIEWER, "").0, 200, "but not this one");
+    assert_ne!(
+        ask(&mut right, "GET /state.json", VIEWER, "").0,
+        200,
+        "a viewer's token is new on this connection, so it needs a guess"
+    );
     std::thread::sleep(Duration::from_millis(2500));
     assert_eq!(served.ask("GET /state.json", OPERATOR, "").0, 200);
 }
 
 #[test]
-fn right_tokens_cost_no_guess() {
+fn right_tokens_use_no_guess() {
     let served = served(&[]);
     for _ in 0..50 {
         assert_eq!(served.ask("GET /state.json", OPERATOR, "").0, 200);
@@ -295,7 +299,7 @@ fn right_tokens_cost_no_guess() {
 }
 
 #[test]
-fn old_token_that_is_shown_again_costs_one_guess() {
+fn repeated_wrong_token_uses_one_guess() {
     let served = served(&[]);
     for _ in 0..50 {
         assert_eq!(served.ask("GET /state.json", "Cookie: headrace_token=of-yesterday\r\n", "").0, 401);
@@ -304,7 +308,7 @@ fn old_token_that_is_shown_again_costs_one_guess() {
 }
 
 #[test]
-fn guesses_count_by_forwarded_address_behind_a_declared_proxy() {
+fn guesses_behind_a_declared_proxy_count_by_forwarded_address() {
     let served = served(&[Ipv4Addr::LOCALHOST.into()]);
     let status = |of: &str, token: &str| {
         let headers = format!("X-Forwarded-For: {of}\r\nAuthorization: Bearer {token}\r\n");
@@ -316,12 +320,12 @@ fn guesses_count_by_forwarded_address_behind_a_declared_proxy() {
     assert_eq!(
         status("10.0.0.2, 10.0.0.1", "operator-01234567"),
         429,
-        "what a client makes up isn't believed"
+        "an address that the client adds isn't trusted"
     );
 }
 
 #[test]
-fn guesses_of_a_flood_are_21_in_the_first_second() {
+fn flood_gets_at_most_26_guesses_in_5_s() {
     let served = served(&[]);
     let began = Instant::now();
     let (mut guesses, mut requests) = (0_u32, 0_u32);
@@ -342,7 +346,7 @@ fn guesses_of_a_flood_are_21_in_the_first_second() {
 }
 
 #[test]
-fn actions_are_limited_and_accepted_ones_are_passed_on() {
+fn accepted_actions_are_passed_on_and_excess_actions_refused() {
     let served = served(&[]);
     let mut stream = served.connect();
     let (mut done, mut refused) = (0, 0);

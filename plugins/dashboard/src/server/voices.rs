@@ -1,4 +1,4 @@
-//! Recordings of voice notes: accepted from operators for the log, and played to viewers.
+//! Recordings of voice notes: received from operators for the log, and played to viewers.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,18 +19,19 @@ use super::reply::{Here, json_answer, plain, refused};
 use super::{Voices, feed};
 use crate::access::query;
 
-/// Number of begun voice notes without a recording; beyond it the oldest is forgotten.
+/// Maximum number of voice notes that wait for their recording. Beyond it the oldest is forgotten.
 const MOST_BEGUN: usize = 32;
-/// Size of recordings held for playing, bytes; beyond it the oldest are dropped from memory and stay in the log.
+/// Maximum size of recordings kept in memory for playing, bytes. The oldest are dropped from memory but stay in the
+/// log.
 const MOST_HELD_BYTES: usize = 16 << 20;
-/// Number of recordings received at a time.
+/// Maximum number of recordings received at the same time.
 const MOST_COMING: usize = 2;
-/// Budget of recordings: burst, and refill per second.
+/// Budget of uploads: burst, and refill per second.
 const RATE: (f64, f64) = (8.0, 0.2);
 /// Timeout of an upload: 512 KiB at 10 kB/s.
 const COMES_WITHIN: Duration = Duration::from_mins(1);
 
-/// State of voice notes whose recordings are expected or held.
+/// Voice notes that wait for their recording, and recordings kept in memory.
 pub(crate) struct Desk {
     to: Voices,
     begun: Mutex<VecDeque<u32>>,
@@ -40,7 +41,7 @@ pub(crate) struct Desk {
     recalling: Semaphore,
 }
 
-/// Status and reason.
+/// Status and reason of a refusal.
 type Refusal = (StatusCode, String);
 
 impl Desk {
@@ -55,7 +56,7 @@ impl Desk {
         }
     }
 
-    /// Registers a voice note that the loop knows.
+    /// Registers a voice note whose recording is to follow.
     pub(super) fn begin(&self, id: u32) {
         let mut begun = self.begun();
         if !begun.contains(&id) {
@@ -86,7 +87,7 @@ impl Desk {
         }
     }
 
-    /// Stores the recording of a begun note; repeated uploads are accepted.
+    /// Stores the recording of a registered note. A repeated upload of the same recording is accepted.
     fn keep(&self, voice: Voice) -> Result<(), Refusal> {
         let Voices::Kept(keep) = &self.to else {
             return Err((
@@ -101,7 +102,7 @@ impl Desk {
             let why = format!("no voice note {} waits for its recording", voice.id);
             return Err((StatusCode::CONFLICT, why));
         }
-        // Stored before any viewer is notified.
+        // Keep the recording in memory before the loop notifies viewers, so that they can play it at once.
         let voice = Arc::new(voice);
         self.hold(Arc::clone(&voice));
         if let Err(why) = keep(&voice) {
@@ -112,10 +113,10 @@ impl Desk {
         Ok(())
     }
 
-    /// The recording of a note, from memory or from the log.
+    /// Returns the recording of a note, from memory or from the log.
     async fn recall(&self, id: u32, at_s: f64) -> Result<Option<Arc<Voice>>, Refusal> {
         let Voices::Recalled(recall) = &self.to else { return Ok(self.get(id)) };
-        // One at a time, because each may read much of a log.
+        // Only one search at a time, because each may read much of a log.
         let _turn = self.recalling.acquire().await;
         if let Some(voice) = self.get(id) {
             return Ok(Some(voice));
@@ -131,7 +132,7 @@ impl Desk {
     }
 }
 
-/// Receives the recording of a voice note that was begun on the feed.
+/// Receives the recording of a voice note that was begun over the feed.
 pub(super) async fn take(
     State(shared): Here,
     Path(id): Path<String>,
@@ -194,7 +195,7 @@ fn refusal(error: &VoiceError) -> Refusal {
     (status, error.to_string())
 }
 
-/// Plays the recording of a voice note to any viewer.
+/// Returns the recording of a voice note to any viewer.
 pub(super) async fn play(State(shared): Here, Path(id): Path<String>, _: Admitted) -> Response {
     let spoken = id.parse().ok().and_then(|id| Some((id, shared.model().spoken_s(id)?)));
     let Some((id, at_s)) = spoken else {
@@ -205,11 +206,11 @@ pub(super) async fn play(State(shared): Here, Path(id): Path<String>, _: Admitte
             ([(header::CONTENT_TYPE, voice.container.media_type())], voice.audio.clone()).into_response()
         }
         Ok(None) => {
-            plain(StatusCode::NOT_FOUND, "its recording isn't available here; it may be in the log\n")
+            plain(StatusCode::NOT_FOUND, "the note's recording isn't available here; it may be in the log\n")
         }
         Err((status, why)) => {
             let kind = [(header::CONTENT_TYPE, "text/plain; charset=utf-8")];
-            (status, kind, format!("its recording can't be read: {why}\n")).into_response()
+            (status, kind, format!("the note's recording can't be read: {why}\n")).into_response()
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Round trips through both ends of real ports.
+//! Round trips between the emulated device end and the host end of real ports.
 
 use std::net::Ipv4Addr;
 use std::time::Duration;
@@ -47,7 +47,7 @@ fn bytes_pass_both_ways_on_every_available_carrier() {
 }
 
 #[test]
-fn returning_host_is_served_again() {
+fn reconnected_host_is_served_again() {
     for carrier in [Carrier::Serial, Carrier::Tcp, Carrier::Udp] {
         let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         for round in 0..3 {

@@ -1,4 +1,4 @@
-//! CAN interfaces, as `/sys/class/net` lists them.
+//! Lists CAN interfaces from `/sys/class/net`.
 
 use headrace_sensor::connect::Connect;
 use headrace_sensor::driver::Carrier;
@@ -22,24 +22,24 @@ fn is_can(machine: &Machine, name: &str) -> bool {
     machine.text(&format!("{CLASS}/{name}/type")).as_deref() == Some(CAN)
 }
 
-/// True if this machine has a network interface of that name that is up.
+/// Whether this machine has a network interface of that name, and it is up.
 pub fn is_interface_up(name: &str) -> bool {
     is_up(&Machine::ours(), name) == Some(true)
 }
 
-/// True if the interface is up; `None` if its flags can't be read.
+/// Whether the interface is up; `None` if its flags can't be read.
 fn is_up(machine: &Machine, name: &str) -> Option<bool> {
     let flags = machine.text(&format!("{CLASS}/{name}/flags"))?;
     let flags = u32::from_str_radix(flags.trim_start_matches("0x"), 16).ok()?;
     Some(flags & UP != 0)
 }
 
-/// True if the interface has a hardware adapter, and so a bit rate.
+/// Whether the interface is a hardware adapter, which needs a bit rate. Virtual interfaces have none.
 fn has_hardware(machine: &Machine, name: &str) -> bool {
     machine.exists(&format!("{CLASS}/{name}/device"))
 }
 
-/// Error if the interface is down; `None` if it is up or its flags can't be read.
+/// Returns an error if the interface is down; `None` if it is up or its flags can't be read.
 pub(crate) fn down(machine: &Machine, name: &str) -> Option<OpenError> {
     if is_up(machine, name)? {
         return None;
@@ -49,7 +49,7 @@ pub(crate) fn down(machine: &Machine, name: &str) -> Option<OpenError> {
     Some(OpenError::new(OpenErrorKind::Other, why, Some(&mends)))
 }
 
-/// Problems that keep the interface from being used.
+/// Returns the problems that prevent use of the interface.
 pub(super) fn troubles(machine: &Machine, name: &str) -> Vec<OpenError> {
     if !is_can(machine, name) {
         return vec![OpenError::no_interface(name)];

@@ -1,4 +1,4 @@
-//! A device as described by the system's files.
+//! Description of a device, from the system's files.
 
 use headrace_sensor::driver::Carrier;
 
@@ -8,18 +8,18 @@ use crate::open_error::OpenError;
 /// A port or interface that a sensor may be connected to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
-    /// Carrier of its bytes.
+    /// Carrier of the port or interface.
     pub carrier: Carrier,
     /// Current name of the device file or network interface.
     pub name: String,
-    /// Self-description, such as the product name.
+    /// Description that the device gives of itself, such as the product name.
     pub says: Option<String>,
-    /// Value of `connect` for the vehicle file; for a bus, with a placeholder for the device's address.
+    /// Value of `connect` for the vehicle file. For a bus it has a placeholder for the device's address.
     pub connect: Option<String>,
-    /// Further properties, as (name, value).
+    /// Further properties, each with name and value.
     pub details: Vec<(&'static str, String)>,
-    /// Access rights; `None` for a network interface, which needs none.
+    /// Access rights of the device file; `None` for a network interface, which needs none.
     pub rights: Option<Rights>,
-    /// Problems that keep it from being used, each with its fix.
+    /// Problems that prevent use of the device, each with its fix.
     pub troubles: Vec<OpenError>,
 }

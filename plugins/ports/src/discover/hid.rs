@@ -1,4 +1,4 @@
-//! HID devices, as `/sys/class/hidraw` lists them.
+//! Lists HID devices from `/sys/class/hidraw`.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use headrace_sensor::driver::Carrier;
 use super::{Found, Machine, Rights};
 
 const CLASS: &str = "/sys/class/hidraw";
-/// First item of a report descriptor: usage page of one or two bytes. Source: HID 1.11, 6.2.2.7.
+/// First item of a report descriptor: the usage page, with one or two bytes of data. Source: HID 1.11, 6.2.2.7.
 const PAGE_1: u8 = 0x05;
 const PAGE_2: u8 = 0x06;
 
@@ -16,13 +16,13 @@ pub(super) fn found(machine: &Machine) -> Vec<Found> {
     machine.names(CLASS).into_iter().filter_map(|name| describe(machine, &name)).collect()
 }
 
-/// Identities of all devices, with their paths.
+/// Returns the paths and identities of all HID devices.
 pub(super) fn identities(machine: &Machine) -> Vec<(String, UsbIdentity)> {
     let names = machine.names(CLASS).into_iter();
     names.filter_map(|name| Some((format!("/dev/{name}"), identity(machine, &name)?.0))).collect()
 }
 
-/// Identity and product name of a device.
+/// Returns the identity and product name of a device.
 fn identity(machine: &Machine, name: &str) -> Option<(UsbIdentity, Option<String>)> {
     let event = machine.text(&format!("{CLASS}/{name}/device/uevent"))?;
     let value = |key: &str| {

@@ -1,4 +1,4 @@
-//! I2C buses, as `/sys/bus/i2c` lists them.
+//! Lists I2C buses from `/sys/bus/i2c`.
 
 use headrace_sensor::driver::Carrier;
 
@@ -8,7 +8,7 @@ use crate::open_error::{OpenError, OpenErrorKind};
 
 const DEVICES: &str = "/sys/bus/i2c/devices";
 
-/// Lists buses; the folder also holds the devices on them, under other names.
+/// Returns the buses. The folder also lists the devices on them, whose names don't begin with `i2c-`.
 pub(super) fn found(machine: &Machine) -> Vec<Found> {
     let names = machine.names(DEVICES).into_iter();
     let buses = names.filter(|name| name.strip_prefix("i2c-").is_some_and(|n| n.parse::<u32>().is_ok()));
@@ -29,7 +29,7 @@ fn describe(machine: &Machine, name: &str) -> Found {
     }
 }
 
-/// Problem that keeps a bus from being used.
+/// Returns the problem that prevents use of a bus.
 pub(super) fn trouble(machine: &Machine, path: &str) -> Option<OpenError> {
     if let Some(rights) = Rights::of(machine, path) {
         return rights.trouble(path);

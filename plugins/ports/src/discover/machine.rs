@@ -1,4 +1,4 @@
-//! The system's files, of this machine or a copy of another's.
+//! Reads the system's files of this machine, or of a copy of another machine's file tree.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,9 +8,9 @@ use rustix::fs::{Access, access};
 /// User whose access rights are checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum User {
-    /// The user running this program. Checked by the kernel, so that access lists count.
+    /// The user running this program. The kernel checks the rights, so access control lists count.
     Ourselves,
-    /// Another user, checked by file modes only.
+    /// Another user. Only file modes are checked.
     Other {
         /// User id.
         uid: u32,
@@ -19,7 +19,7 @@ pub enum User {
     },
 }
 
-/// A machine of which `/dev`, `/sys`, `/proc`, `/etc` and `/lib` are read.
+/// A machine whose files below `/dev`, `/sys`, `/proc`, `/etc` and `/lib` are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Machine {
     root: PathBuf,
@@ -27,17 +27,17 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This machine, for the user running this program.
+    /// This machine, as seen by the user running this program.
     pub fn ours() -> Self {
         Self { root: PathBuf::from("/"), user: User::Ourselves }
     }
 
-    /// A machine whose folders are below `root`.
+    /// A machine whose file tree is below `root`.
     pub fn below(root: &Path, user: User) -> Self {
         Self { root: root.to_owned(), user }
     }
 
-    /// Path on this host of the machine's file `absolute`.
+    /// Returns where the machine's file `absolute` is on this host.
     pub(super) fn path(&self, absolute: &str) -> PathBuf {
         self.root.join(absolute.trim_start_matches('/'))
     }
@@ -46,12 +46,12 @@ impl Machine {
         self.path(absolute).exists()
     }
 
-    /// Trimmed text of a file; `None` if it is empty or can't be read.
+    /// Returns the trimmed text of a file; `None` if it is empty or can't be read.
     pub(super) fn text(&self, absolute: &str) -> Option<String> {
         text(&self.path(absolute))
     }
 
-    /// Names in a folder in numeric order: `ttyUSB2` before `ttyUSB10`.
+    /// Returns the names in a folder in numeric order: `ttyUSB2` before `ttyUSB10`.
     pub(super) fn names(&self, folder: &str) -> Vec<String> {
         let entries = fs::read_dir(self.path(folder)).into_iter().flatten().flatten();
         let mut names: Vec<String> =
@@ -64,7 +64,7 @@ impl Machine {
         names
     }
 
-    /// User id and group ids.
+    /// Returns the user's id and group ids.
     pub(super) fn ids(&self) -> (u32, Vec<u32>) {
         match &self.user {
             User::Other { uid, gids } => (*uid, gids.clone()),
@@ -77,20 +77,20 @@ impl Machine {
         }
     }
 
-    /// Kernel's answer whether the file can be read and written; `None` for another user.
+    /// Asks the kernel whether the user may read and write a file; `None` for another user.
     pub(super) fn asked_kernel(&self, absolute: &str) -> Option<bool> {
         (self.user == User::Ourselves)
             .then(|| access(self.path(absolute), Access::READ_OK | Access::WRITE_OK).is_ok())
     }
 
-    /// Name of an id in `/etc/group` or `/etc/passwd`; both have the id as the third field.
+    /// Returns the name for an id in `/etc/group` or `/etc/passwd`. The id is the third field in both.
     pub(super) fn name_of(&self, file: &str, number: u32) -> Option<String> {
         let all = self.text(file)?;
         let line = all.lines().find(|line| line.split(':').nth(2) == Some(number.to_string().as_str()))?;
         line.split(':').next().map(str::to_owned)
     }
 
-    /// True if `/etc/group` lists the user in the group, even if this session predates it.
+    /// Whether `/etc/group` lists the user in the group. The present session may have begun before that.
     pub(super) fn is_listed(&self, group: &str) -> bool {
         let listed = || {
             let user = self.name_of("/etc/passwd", self.ids().0)?;
@@ -101,13 +101,13 @@ impl Machine {
         listed().unwrap_or(false)
     }
 
-    /// True if the kernel has registered a protocol of this name, from a module or built in.
+    /// Whether the kernel has registered a protocol of this name, from a module or built in.
     pub(super) fn has_protocol(&self, name: &str) -> bool {
         let all = self.text("/proc/net/protocols").unwrap_or_default();
         all.lines().any(|line| line.split_whitespace().next() == Some(name))
     }
 
-    /// True if the kernel has the module loaded, built in or available; `name` with underscores.
+    /// Whether the kernel has this module loaded, built in or available. Write `name` with underscores.
     pub(super) fn has_module(&self, name: &str) -> bool {
         let is_it = |path: &str| {
             let file = path.trim_end_matches(':').rsplit('/').next().unwrap_or_default();
@@ -125,7 +125,7 @@ impl Machine {
     }
 }
 
-/// Trimmed text of a file; `None` if it is empty or can't be read.
+/// Returns the trimmed text of a file; `None` if it is empty or can't be read.
 pub(super) fn text(path: &Path) -> Option<String> {
     let bytes = fs::read(path).ok()?;
     Some(String::from_utf8_lossy(&bytes).trim().to_owned()).filter(|text| !text.is_empty())

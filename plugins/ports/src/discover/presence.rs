@@ -5,18 +5,18 @@ use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 use super::{Machine, Rights, can, hid, i2c, serial};
 use crate::open_error::OpenError;
 
-/// Presence of the target of a `connect`.
+/// Result of a check of a `connect`'s target.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Presence {
-    /// It exists and can be opened, under this name.
+    /// The target exists under this name and can be opened.
     There(String),
-    /// A network address, which can only be checked by connecting.
+    /// The target is a network address, which can only be checked by connecting.
     Elsewhere,
 }
 
 /// Checks whether the target of `connect` exists and can be opened, without opening it.
 ///
-/// Errors: it is absent, ambiguous or not accessible; with the fix.
+/// Errors: the target is absent, ambiguous or not accessible; the error states the fix.
 pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, OpenError> {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => file(machine, path),
@@ -40,7 +40,7 @@ pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, OpenEr
     }
 }
 
-/// Path of the only matching device.
+/// Returns the path of the only matching device.
 fn one(what: &str, all: Vec<(String, UsbIdentity)>, wanted: &UsbIdentity) -> Result<String, OpenError> {
     let fitting = all.into_iter().filter(|(_, got)| serial::fits(got, wanted));
     let mut paths: Vec<String> = fitting.map(|(path, _)| path).collect();

@@ -1,4 +1,4 @@
-//! Access rights of a device file, and the command that grants them.
+//! Access rights of a device file, and the command that grants access.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt as _;
@@ -10,22 +10,22 @@ use crate::open_error::OpenError;
 /// Access rights of a device file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rights {
-    /// Owner's name, or id if it has none.
+    /// Name of the owner, or the owner's id if it has no name.
     pub owner: String,
-    /// Group's name, or id if it has none.
+    /// Name of the group, or the group's id if it has no name.
     pub group: String,
-    /// Permission bits (nine), as for `chmod`.
+    /// The nine permission bits, as for `chmod`.
     pub mode: u32,
-    /// True if the user can read and write it.
+    /// Whether the user can read and write the file.
     pub may_open: bool,
-    /// True if the group has access and isn't root's.
+    /// Whether the group has access and isn't root's group.
     by_group: bool,
-    /// True if the group lists the user, whether or not this session has it.
+    /// Whether the group lists the user, although this session may have begun before that.
     listed: bool,
 }
 
 impl Rights {
-    /// Rights of a device file; `None` if it doesn't exist.
+    /// Returns the rights of a device file; `None` if it doesn't exist.
     pub(super) fn of(machine: &Machine, path: &str) -> Option<Self> {
         let file = fs::metadata(machine.path(path)).ok()?;
         let (uid, gids) = machine.ids();
@@ -38,7 +38,7 @@ impl Rights {
             mode
         };
         let group = machine.name_of("/etc/group", file.gid());
-        // Joining root's group is never advised.
+        // The advice must never be to join root's group.
         let by_group = mode >> 3 & 0o6 == 0o6 && group.as_deref().is_some_and(|group| group != "root");
         let group = group.unwrap_or_else(|| file.gid().to_string());
         let by_mode = uid == 0 || bits & 0o6 == 0o6;
@@ -52,7 +52,7 @@ impl Rights {
         })
     }
 
-    /// Error if the user can't open the file.
+    /// Returns an error if the user can't open the file.
     pub(super) fn trouble(&self, path: &str) -> Option<OpenError> {
         (!self.may_open).then(|| OpenError::denied(path, &self.remedy(path)))
     }
@@ -68,7 +68,7 @@ impl Rights {
     }
 }
 
-/// Command that gives the current user access to a device file.
+/// Returns the command that gives the current user access to a device file.
 pub(crate) fn remedy_for(path: &str) -> String {
     let rights = Rights::of(&Machine::ours(), path);
     rights.map_or_else(|| fix_hint::rule(path), |rights| rights.remedy(path))

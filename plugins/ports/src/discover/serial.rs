@@ -1,4 +1,4 @@
-//! Serial ports, as `/sys/class/tty` lists them.
+//! Lists serial ports from `/sys/class/tty`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,12 +11,12 @@ use super::{Found, Machine, Rights};
 
 const CLASS: &str = "/sys/class/tty";
 const BY_ID: &str = "/dev/serial/by-id";
-/// Port type of UARTs announced by firmware but not detected. Source: Linux, `PORT_UNKNOWN`.
+/// Port type of a UART that firmware announces but the kernel hasn't detected. Source: Linux, `PORT_UNKNOWN`.
 const NOBODY_THERE: &str = "0";
-/// Levels from a tty up to its USB device: port, interface, device.
+/// Number of folders searched for the USB device: the tty's own, then port, interface and device above it.
 const MOST_UP: usize = 4;
 
-/// USB descriptors of an adapter.
+/// USB descriptors of a serial adapter.
 struct Usb {
     identity: UsbIdentity,
     says: Option<String>,
@@ -41,19 +41,19 @@ pub(super) fn found(machine: &Machine) -> Vec<Found> {
     described.collect()
 }
 
-/// True if the identity `got` matches the identity `wanted` by a `connect`.
+/// Whether an adapter's identity `got` matches the identity `wanted` in a `connect`.
 pub(super) fn fits(got: &UsbIdentity, wanted: &UsbIdentity) -> bool {
     (got.vendor, got.product) == (wanted.vendor, wanted.product)
         && (wanted.serial.is_none() || wanted.serial == got.serial)
 }
 
-/// Identities of the USB adapters, with their port names.
+/// Returns the port names and identities of all USB serial adapters.
 pub(super) fn adapters(machine: &Machine) -> Vec<(String, UsbIdentity)> {
     let names = machine.names(CLASS).into_iter().filter(|name| is_port(machine, name));
     names.filter_map(|name| Some((format!("/dev/{name}"), usb(machine, &name)?.identity))).collect()
 }
 
-/// True for a tty with hardware; consoles and pseudoterminals have none.
+/// Whether a tty has hardware. Consoles and pseudoterminals have none.
 fn is_port(machine: &Machine, name: &str) -> bool {
     machine.exists(&format!("{CLASS}/{name}/device"))
         && machine.exists(&format!("/dev/{name}"))
@@ -84,7 +84,7 @@ fn describe(machine: &Machine, name: &str, usb: Option<&Usb>, unique: Option<Usb
     let baud = 115_200;
     let by_path = |path: &String| Connect::Serial { port: SerialPort::Path(path.clone()), baud };
     let by_usb = unique.map(|identity| Connect::Serial { port: SerialPort::Usb(identity), baud });
-    // A serial number may contain characters that `connect` can't express.
+    // Identities whose serial number has characters that `connect` can't express are left out.
     let by_usb = by_usb.filter(|connect| Connect::parse(&connect.to_string()).as_ref() == Ok(connect));
     let connect = by_usb.unwrap_or_else(|| by_path(by_id.as_ref().unwrap_or(&path)));
     let mut details = Vec::new();
@@ -102,7 +102,7 @@ fn describe(machine: &Machine, name: &str, usb: Option<&Usb>, unique: Option<Usb
     }
 }
 
-/// Stable name, independent of the USB socket in use.
+/// Returns the port's name below `/dev/serial/by-id`, which doesn't depend on the USB socket in use.
 fn by_id(machine: &Machine, name: &str) -> Option<String> {
     let links = machine.names(BY_ID).into_iter().map(|link| format!("{BY_ID}/{link}"));
     let mut links = links.filter(|link| {

@@ -1,4 +1,4 @@
-//! Discovery on file trees like those of real machines, for users with and without access.
+//! Discovery on file trees that imitate real machines, for users with and without access.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
@@ -9,8 +9,9 @@ use headrace_sensor::connect::Connect;
 use super::*;
 use crate::open_error::OpenErrorKind;
 
-/// Another machine's files in a temporary folder. All files belong to this user, and this user's group is called
-/// dialout there.
+/// File tree of another machine in a temporary folder.
+///
+/// All files belong to the present user. The tree's `/etc/group` calls this user's group dialout.
 struct Tree(PathBuf);
 
 impl Drop for Tree {
@@ -51,7 +52,7 @@ impl Tree {
         fs::set_permissions(self.file(path, ""), fs::Permissions::from_mode(mode)).unwrap();
     }
 
-    /// A USB adapter with a port for each of `ttys`.
+    /// Adds a USB adapter with one port for each of `ttys`.
     fn usb_serial(&self, place: &str, (vendor, product): (&str, &str), serial: Option<&str>, ttys: &[&str]) {
         let device = format!("/sys/devices/usb1/{place}");
         self.file(&format!("{device}/idVendor"), format!("{vendor}\n"));
@@ -95,7 +96,7 @@ impl Tree {
         self.path("/etc/group").metadata().unwrap().gid()
     }
 
-    /// The machine as seen by a user who is neither owner, nor in the group, nor root.
+    /// Returns the machine as seen by a user who is neither root nor the owner, and not in the group.
     fn seen_by_stranger(&self) -> Machine {
         self.seen_by(4009, &[4009])
     }
@@ -148,7 +149,7 @@ fn usb_ports_have_stable_names() {
 #[test]
 fn ttys_without_hardware_are_not_listed() {
     let tree = Tree::new("phantoms");
-    // A console without hardware, an undetected UART, a firmware port.
+    // A console without hardware, an undetected UART, and a port announced by firmware.
     tree.file("/sys/class/tty/tty1/uevent", "");
     for (name, kind) in [("ttyS0", "4\n"), ("ttyS1", "0\n")] {
         tree.file(&format!("/sys/class/tty/{name}/type"), kind);
@@ -167,7 +168,7 @@ fn denied_user_gets_the_command_that_grants_access() {
     let join = "sudo usermod -aG dialout $USER, and log in again";
     for (mode, machine, right) in [
         (0o660, tree.seen_by_stranger(), join),
-        // Ann is in the group, but this session predates it.
+        // Ann has joined the group, but her session began before that.
         (
             0o660,
             tree.seen_by(4001, &[4001]),
@@ -194,7 +195,7 @@ fn denied_user_gets_the_command_that_grants_access() {
 }
 
 #[test]
-fn counters_are_named_by_ids_and_serial_number() {
+fn tether_counters_are_named_by_ids_and_serial_number() {
     let tree = Tree::new("hid");
     tree.hid("hidraw0", "COUNTER-7", 0o600);
     tree.hid("hidraw1", "COUNTER-8", 0o660);
@@ -209,7 +210,7 @@ fn counters_are_named_by_ids_and_serial_number() {
 }
 
 #[test]
-fn can_interfaces_report_missing_requirements() {
+fn unusable_can_interfaces_report_problem_and_fix() {
     let tree = Tree::new("can");
     tree.net("eth0", "1", "0x1003", "up");
     tree.net("can0", "280", "0x40080", "down");
@@ -234,7 +235,7 @@ fn can_interfaces_report_missing_requirements() {
     }
     tree.file("/proc/modules", "");
     assert!(said(&machine, "can:vcan0").contains("no CAN sockets; sudo modprobe can-raw"));
-    // Built in, or loaded on first use.
+    // The protocol may also be built in, or its module is loaded on first use.
     tree.file("/proc/net/protocols", "protocol  size sockets\nCAN_RAW   1024  0\n");
     assert_eq!(said(&machine, "can:vcan0"), "There(\"vcan0\")");
     tree.file("/proc/net/protocols", "protocol  size sockets\n");
@@ -244,7 +245,7 @@ fn can_interfaces_report_missing_requirements() {
 }
 
 #[test]
-fn bus_without_device_files_needs_a_module() {
+fn i2c_bus_without_device_file_needs_a_module() {
     let tree = Tree::new("i2c");
     for (name, says) in [("i2c-1", "bcm2835 (i2c@7e804000)"), ("i2c-0", "SMBus I801"), ("1-0040", "ms5837")] {
         tree.file(&format!("/sys/bus/i2c/devices/{name}/name"), says);
@@ -260,12 +261,12 @@ fn bus_without_device_files_needs_a_module() {
 }
 
 #[test]
-fn discovery_runs_on_this_machine() {
+fn discovery_finds_all_usb_serial_ports_of_this_machine() {
     let found = discover(&Machine::ours());
     for found in &found {
         assert!(!found.name.is_empty() && found.connect.is_some(), "{found:?}");
     }
-    // Files that the access rights allow must be accessible.
+    // Device files that the user may open must exist.
     for path in found.iter().filter(|found| found.rights.as_ref().is_some_and(|rights| rights.may_open)) {
         assert!(Path::new(&path.name).exists());
     }

@@ -1,4 +1,4 @@
-//! CAN interfaces, with kernel timestamps.
+//! CAN interfaces, read with kernel timestamps.
 
 use std::io;
 use std::time::Duration;
@@ -15,15 +15,15 @@ use crate::diagnosis;
 use crate::discover::{self, Machine};
 use crate::open_error::OpenError;
 
-/// Length of a `can_frame`, and offset of its data.
+/// Length of a `can_frame`, and offset of its data, bytes.
 const FRAME_BYTES: usize = 16;
 const DATA_AT: usize = 8;
-/// Identifier flag for 29 bits. Source: Linux, `CAN_EFF_FLAG`.
+/// Flag that marks an identifier of 29 bits. Source: Linux, `CAN_EFF_FLAG`.
 const EXTENDED: u32 = 0x8000_0000;
 
-/// Errors that a socket reports once. Source: Linux, errno.
+/// Errors that a socket reports once: interface down, and interface removed. Source: Linux, errno.
 ///
-/// On interface down, the socket receives again when the interface is up. On interface gone, it never receives again.
+/// A socket receives again when its interface comes up. It never receives again after its interface was removed.
 const ENETDOWN: i32 = 100;
 const ENODEV: i32 = 19;
 
@@ -31,7 +31,7 @@ struct Can {
     socket: CanSocket,
     timeout: ReadTimeout,
     interface: String,
-    /// Whether the interface was reported down and no frame has arrived since.
+    /// Whether the interface was reported down, and no frame has arrived since.
     is_down: bool,
 }
 
@@ -39,7 +39,7 @@ pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, OpenError> {
     let opening = || {
         let socket = CanSocket::open(interface)?;
         socket.set_recv_timestamp(true)?;
-        // Bus-off and bus errors arrive as error frames.
+        // The kernel reports bus-off and bus errors as error frames.
         socket.set_error_filter_accept_all()?;
         Ok(socket)
     };
@@ -64,13 +64,13 @@ impl Line for Can {
             stamped = Some(clock::of_wall(stamp));
             FRAME_BYTES
         });
-        // The socket is kept, so that no frame is missed when the interface comes up.
+        // The socket stays open, so that no frame is missed when the interface comes up.
         match read.as_ref().err().and_then(io::Error::raw_os_error) {
             Some(ENETDOWN) => {
                 self.is_down = true;
                 return Ok(None);
             }
-            Some(ENODEV) => return Err(io::Error::new(io::ErrorKind::NotFound, "its interface is gone")),
+            Some(ENODEV) => return Err(io::Error::new(io::ErrorKind::NotFound, "the interface was removed")),
             _ => {}
         }
         let came = waited(read)?.zip(stamped).map(|(count, at)| (at, count));
@@ -88,13 +88,13 @@ impl Line for Can {
     }
 }
 
-/// Sends a frame on a bus.
+/// Sends a frame on a CAN bus.
 pub(crate) fn write(socket: &CanSocket, bytes: &[u8]) -> io::Result<()> {
-    let refused = || io::Error::new(io::ErrorKind::InvalidInput, "no can_frame of 16 bytes");
+    let refused = || io::Error::new(io::ErrorKind::InvalidInput, "expected a can_frame of 16 bytes");
     socket.write_frame(&frame(bytes).ok_or_else(refused)?)
 }
 
-/// Serializes a frame as the kernel's `can_frame`: identifier with flags, length, three padding bytes, data.
+/// Encodes a frame as the kernel's `can_frame`: identifier with flags, length, three padding bytes, data.
 fn bytes_of(frame: &CanFrame) -> [u8; FRAME_BYTES] {
     let mut bytes = [0; FRAME_BYTES];
     let data = frame.data();
@@ -108,7 +108,7 @@ fn bytes_of(frame: &CanFrame) -> [u8; FRAME_BYTES] {
     bytes
 }
 
-/// Parses a kernel `can_frame`.
+/// Decodes a `can_frame` of the kernel.
 fn frame(bytes: &[u8]) -> Option<CanFrame> {
     let (word, rest) = bytes.split_first_chunk::<4>().filter(|_| bytes.len() == FRAME_BYTES)?;
     let word = u32::from_ne_bytes(*word);

@@ -17,7 +17,7 @@ use crate::open_error::OpenError;
 
 struct Hid {
     device: HidDevice,
-    /// Lock against other headrace processes, because the kernel gives each report to every program that has the
+    /// Lock that keeps other headrace processes out. The kernel would give each report to every program with the
     /// device open.
     _lock: File,
 }
@@ -33,7 +33,7 @@ pub(super) fn open(identity: &UsbIdentity) -> Result<Box<dyn Line>, OpenError> {
     Ok(Box::new(Hid { device: opened.map_err(|error| failed(&error))?, _lock: lock }))
 }
 
-/// Device file of the only device with this identity.
+/// Returns the device file of the only device with this identity.
 pub(super) fn path_of(identity: &UsbIdentity) -> Result<String, OpenError> {
     let what = format!("hid:{identity}");
     let api = HidApi::new().map_err(|error| diagnosis::opening(&what, &io_error(&error)))?;
@@ -54,7 +54,7 @@ fn is_it(device: &DeviceInfo, identity: &UsbIdentity) -> bool {
 fn io_error(error: &HidError) -> io::Error {
     match error {
         HidError::IoError { error } => io::Error::new(error.kind(), error.to_string()),
-        // hidapi's only mark of an unplugged device is this text.
+        // hidapi reports an unplugged device only by this text.
         other if other.to_string().contains("disconnected") => {
             io::Error::new(io::ErrorKind::BrokenPipe, "it was unplugged")
         }

@@ -1,4 +1,4 @@
-//! I2C buses, over embedded-hal's trait.
+//! I2C buses, accessed through embedded-hal's trait.
 
 use std::io;
 use std::thread;
@@ -13,7 +13,7 @@ use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
 
-/// A device on a bus.
+/// A device at an address on a bus.
 struct Bus<B> {
     bus: B,
     address: u8,
@@ -22,7 +22,7 @@ struct Bus<B> {
 pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
     let opened =
         I2cdev::new(bus).map_err(|error| diagnosis::opening(bus, &io::Error::other(error.to_string())));
-    // The crate's error hides the error kind; opening the file directly returns it.
+    // The crate's error hides its kind, so the file is opened directly to get the kind.
     let opened = opened.map_err(|trouble| match std::fs::File::open(bus) {
         Err(error) => diagnosis::opening(bus, &error),
         Ok(_) => trouble,
@@ -31,7 +31,7 @@ pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
 }
 
 impl<B: I2c + Send> Line for Bus<B> {
-    /// A bus carries no unsolicited data.
+    /// A bus has only transactions, so there is nothing to read between them.
     fn read(&mut self, wait: Duration, _: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
         thread::sleep(wait);
         Ok(None)
@@ -41,7 +41,7 @@ impl<B: I2c + Send> Line for Bus<B> {
         self.bus.write(self.address, bytes).map_err(|error| failed(&error))
     }
 
-    /// Separate write and read: the sensor doesn't support a repeated start.
+    /// Write and read are separate transfers, because the sensor doesn't support a repeated start.
     fn exchange(
         &mut self,
         write: &[u8],
@@ -69,7 +69,7 @@ mod tests {
 
     use super::*;
 
-    /// A bus with a device that answers with the first byte of the last write.
+    /// A bus with one device, which answers with the first byte of the last write.
     struct Echo(Vec<u8>);
 
     impl ErrorType for Echo {
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn transaction_is_the_written_then_the_read_bytes() {
+    fn transaction_returns_written_bytes_then_read_bytes() {
         let mut line = Bus { bus: Echo(Vec::new()), address: 0x40 };
         let (_, bytes) = line.exchange(&[0xAC], DurNs(0), 5).unwrap().unwrap();
         assert_eq!(bytes, [0xAC; 6]);

@@ -1,4 +1,4 @@
-//! An open line, and read helpers shared by sockets and serial ports.
+//! The interface of an open line, and read helpers for sockets and serial ports.
 
 use std::io;
 use std::time::Duration;
@@ -8,29 +8,30 @@ use std::net::SocketAddr;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::driver::IgnoredSenders;
 
-/// Maximum bytes of one read.
+/// Maximum number of bytes returned by one read.
 pub const READ_BYTES: usize = 2048;
 
-/// Senders on a line that accepts any sender. The value survives a reopening of the line.
+/// Senders on a line that accepts any sender. They are kept when the line is reopened.
 #[derive(Default)]
 pub struct Senders {
-    /// Accepted sender, which is the device.
+    /// The accepted sender, which is taken to be the device.
     pub believed: Option<SocketAddr>,
-    /// Rejected senders.
+    /// Senders that were rejected.
     pub strangers: IgnoredSenders,
 }
 
-/// Returns whether bytes hold a message of a device on the line.
+/// Whether bytes contain a message of a device on the line.
 pub type IsValid<'a> = &'a dyn Fn(&[u8]) -> bool;
 
 /// An open line.
 pub trait Line: Send {
-    /// Waits up to `wait` for bytes; returns the first one's receive time and the count. `None` on timeout.
+    /// Waits up to `wait` for bytes. Returns the receive time of the first byte, and the count; `None` on timeout.
     ///
     /// Errors: the connection is lost.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>>;
 
-    /// As [`Line::read`] on a line that accepts any sender: returns only bytes of one sender, the first valid one.
+    /// Reads as [`Line::read`]. On a line that accepts any sender, returns only bytes of the first sender with a
+    /// valid message.
     ///
     /// Errors: the connection is lost.
     fn read_device(
@@ -43,15 +44,17 @@ pub trait Line: Send {
         self.read(wait, into)
     }
 
-    /// Sends bytes; on a message carrier they form one message.
+    /// Sends bytes. On a carrier of messages they form one message.
     ///
     /// Errors: the connection is lost.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Exchanges a transaction on a bus: writes, waits `settle`, and reads.
+    /// Performs a transaction on a bus: writes, waits `settle`, and reads.
     ///
-    /// Returns the bytes written and then the bytes read, with the time at which the read began. `None` if the answer
-    /// comes as a message. Errors: the connection is lost; the line is no bus.
+    /// Returns the time at which the read began, and the bytes written followed by the bytes read. Returns `None` if
+    /// the answer comes later as a message.
+    ///
+    /// Errors: the connection is lost; the line is no bus.
     fn exchange(
         &mut self,
         write: &[u8],
@@ -59,20 +62,23 @@ pub trait Line: Send {
         read_bytes: usize,
     ) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
         let _ = (write, settle, read_bytes);
-        Err(io::Error::new(io::ErrorKind::Unsupported, "only an I2C bus, or UDP in its place, exchanges"))
+        Err(io::Error::new(
+            io::ErrorKind::Unsupported,
+            "only an I2C bus, or UDP in place of a bus, supports transactions",
+        ))
     }
 
-    /// Reason why no data can come at present, with its fix, if the line can detect one.
+    /// Returns the reason why no data can arrive at present, with its fix, if the line can detect one.
     fn complaint(&self) -> Option<String> {
         None
     }
 
-    /// Number of messages dropped unread since the last call, as far as the carrier reports them.
+    /// Returns the number of messages dropped unread since the last call, as far as the carrier reports them.
     fn dropped(&mut self) -> u64 {
         0
     }
 
-    /// Keep-alive, called about once a second on an idle line, for carriers that forget silent clients.
+    /// Sends a keep-alive, for carriers that forget silent clients. Called about once a second on an idle line.
     ///
     /// Errors: the connection is lost.
     fn knock(&mut self) -> io::Result<()> {
@@ -82,7 +88,7 @@ pub trait Line: Send {
 
 /// Performs [`Line::exchange`] on an emulated bus.
 ///
-/// It sends a datagram of the bytes to write and the read length; the answer, which arrives as a message, is the
+/// Sends a datagram with the bytes to write and the read length. The device answers with a message that contains the
 /// transaction.
 pub(super) fn exchange_by_datagram(
     line: &mut impl Line,
@@ -94,7 +100,7 @@ pub(super) fn exchange_by_datagram(
     Ok(None)
 }
 
-/// A socket's read timeout, which is set only when it changes: most waits are as long as the last.
+/// Read timeout of a socket. It is set only when it changes, because most waits are as long as the one before.
 #[derive(Default)]
 pub(super) struct ReadTimeout(Duration);
 
@@ -105,7 +111,7 @@ impl ReadTimeout {
         wait: Duration,
         tell: impl FnOnce(Duration) -> io::Result<()>,
     ) -> io::Result<()> {
-        // A timeout of zero would mean none.
+        // A timeout of zero would mean no timeout.
         let wait = wait.max(Duration::from_micros(1));
         if self.0 != wait {
             tell(wait)?;
@@ -115,7 +121,7 @@ impl ReadTimeout {
     }
 }
 
-/// Result of a read with a timeout; a timeout gives `None`, not an error.
+/// Converts the result of a read with a timeout. A timeout becomes `None` instead of an error.
 pub(super) fn waited(read: io::Result<usize>) -> io::Result<Option<usize>> {
     match read {
         Ok(count) => Ok(Some(count)),

@@ -1,4 +1,4 @@
-//! Open lines to devices: one file per carrier.
+//! Open lines to devices, with one file per carrier.
 
 #[cfg(target_os = "linux")]
 pub(crate) mod can;

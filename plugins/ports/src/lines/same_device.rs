@@ -1,4 +1,4 @@
-//! Tests whether two differently written `connect`s lead to the same device.
+//! Tests whether two different `connect`s lead to the same device.
 
 use std::fs;
 use std::net::{SocketAddr, ToSocketAddrs as _};
@@ -6,23 +6,24 @@ use std::path::PathBuf;
 
 use headrace_sensor::connect::{Connect, SerialPort};
 
-/// Present target of a `connect`.
+/// The device or port that a `connect` leads to at present.
 #[derive(Debug, PartialEq, Eq)]
 enum End {
-    /// A device file, links resolved.
+    /// A device file, with links resolved.
     File(PathBuf),
-    /// An address on a bus.
+    /// A device's address on a bus.
     Bus(PathBuf, u8),
     Tcp(SocketAddr),
     Udp(SocketAddr),
-    /// A local port.
+    /// A local UDP port.
     Local(u16),
 }
 
-/// True if both lead to the same device now: by a link, a USB identity, or another name of a host. False if either is
-/// absent, because then it isn't known.
+/// Whether both lead to the same device now, by a link, a USB identity, or another name of a host.
+///
+/// Returns `false` if either device is absent, because the answer isn't known then.
 pub(crate) fn same_device(one: &Connect, other: &Connect) -> bool {
-    // Name lookups take time, and are useless between carriers.
+    // The carriers are compared first, because name lookups take time.
     one.carrier() == other.carrier() && end(one).is_some_and(|end| Some(end) == self::end(other))
 }
 
@@ -40,7 +41,7 @@ fn end(connect: &Connect) -> Option<End> {
         #[cfg(target_os = "linux")]
         Connect::Hid(identity) => super::hid::path_of(identity).ok().map(|path| End::File(path.into())),
         Connect::I2c { bus, address } => fs::canonicalize(bus).ok().map(|bus| End::Bus(bus, *address)),
-        // A CAN interface has a single name.
+        // CAN interfaces have only one name, so different `connect`s are different interfaces.
         _ => None,
     }
 }
@@ -53,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn links_and_names_of_the_same_device_are_detected() {
+    fn different_connects_to_one_device_are_detected() {
         let folder = std::env::temp_dir().join(format!("headrace-same-device-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let path = |name: &str| folder.join(name).display().to_string();

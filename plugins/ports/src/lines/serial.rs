@@ -1,4 +1,4 @@
-//! Serial ports, by path or by the USB adapter's identity.
+//! Serial ports, opened by path or by the identity of their USB adapter.
 
 use std::io::{self, Read as _, Write as _};
 use std::time::Duration;
@@ -14,7 +14,7 @@ use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
 
-/// Bits per byte on the line: start, eight data, stop.
+/// Bits per byte on the line: a start bit, eight data bits and a stop bit.
 const BITS_A_BYTE: i64 = 10;
 /// Write timeout.
 const WRITE_TIME: Duration = Duration::from_millis(500);
@@ -22,7 +22,7 @@ const WRITE_TIME: Duration = Duration::from_millis(500);
 struct Serial {
     port: TTYPort,
     byte_time: DurNs,
-    /// Time at which the last read emptied the port.
+    /// Time at which the port was last found empty.
     emptied: MonoNs,
 }
 
@@ -38,7 +38,7 @@ pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, OpenEr
     Ok(Box::new(Serial { port, byte_time, emptied: clock::now() }))
 }
 
-/// Converts the serial crate's error, which reports a port locked by another program as absent.
+/// Converts an error of the serial crate, which reports a port locked by another program as absent.
 fn cause(path: &str, error: serialport::Error) -> io::Error {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let opened = rustix::fs::open(path, flags, Mode::empty());
@@ -49,7 +49,7 @@ fn cause(path: &str, error: serialport::Error) -> io::Error {
     }
 }
 
-/// Current path of a USB adapter's port.
+/// Returns the current path of a USB adapter's port.
 pub(super) fn path_of(identity: &UsbIdentity) -> Result<String, OpenError> {
     let what = format!("serial:usb:{identity}");
     let ports = serialport::available_ports().map_err(|error| diagnosis::opening(&what, &error.into()))?;
@@ -76,7 +76,7 @@ impl Line for Serial {
             return Err(io::Error::new(io::ErrorKind::BrokenPipe, "the port is gone"));
         }
         let now = clock::now();
-        // Backdates the first byte by the line time of all bytes, but no earlier than the port was last found empty.
+        // The first byte is backdated by the line time of all bytes, but not before the port was last found empty.
         let ago = DurNs(self.byte_time.0.saturating_mul(i64::try_from(count).unwrap_or(0)));
         let first = (now - ago).max(self.emptied).min(now);
         if count < into.len() {

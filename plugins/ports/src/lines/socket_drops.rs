@@ -1,27 +1,27 @@
-//! Datagrams that the kernel dropped because a socket's queue was full while its reader or the whole machine stalled.
+//! Counts datagrams that the kernel dropped because a socket's queue was full.
 //!
-//! Linux counts them for each socket in `/proc/net/udp`: the tenth column is the socket's inode, the thirteenth the
-//! count. On other systems the count isn't available.
+//! A queue fills while its reader, or the whole computer, stalls. Linux has a count for each socket in
+//! `/proc/net/udp`: the tenth column is the socket's inode, the thirteenth the count. Other systems have no count.
 
 use std::fs;
 use std::net::UdpSocket;
 use std::os::fd::AsRawFd as _;
 use std::os::unix::fs::MetadataExt as _;
 
-/// The kernel's tables for IPv4 and IPv6.
+/// The kernel's tables of UDP sockets for IPv4 and IPv6.
 const TABLES: [&str; 2] = ["/proc/self/net/udp", "/proc/self/net/udp6"];
-/// Columns of the tables.
+/// Indexes of the columns with inode and count.
 const INODE: usize = 9;
 const DROPS: usize = 12;
 
-/// Counts drops at a socket between queries.
+/// Counts drops at a socket since the last query.
 #[derive(Debug, Default)]
 pub(super) struct SocketDrops {
     told: u64,
 }
 
 impl SocketDrops {
-    /// Number of datagrams dropped at a socket since the last call; 0 if the kernel doesn't report it.
+    /// Returns the number of datagrams dropped at a socket since the last call; 0 if the kernel doesn't report it.
     pub(super) fn new_ones(&mut self, socket: &UdpSocket) -> u64 {
         let all = dropped(socket).unwrap_or(self.told);
         let new = all.saturating_sub(self.told);
@@ -35,7 +35,7 @@ fn dropped(socket: &UdpSocket) -> Option<u64> {
     TABLES.iter().find_map(|table| of_inode(&fs::read_to_string(table).ok()?, &inode))
 }
 
-/// Drop count of the socket with this inode, from a table's text.
+/// Returns the drop count of the socket with this inode from the text of a table.
 fn of_inode(table: &str, inode: &str) -> Option<u64> {
     table.lines().find_map(|line| {
         let columns: Vec<&str> = line.split_whitespace().collect();
@@ -48,13 +48,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unread_socket_drops_are_reported_once() {
+    fn dropped_datagrams_are_reported_once() {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
         let mut drops = SocketDrops::default();
         assert_eq!(drops.new_ones(&socket), 0);
         let to = socket.local_addr().unwrap();
-        // More than fits into any queue that a kernel provides by default.
+        // More datagrams than fit into the queue, whatever the kernel's default is.
         let sent: u64 = 40_000;
         for _ in 0..sent {
             sender.send_to(&[7; 1000], to).unwrap();
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn kernel_table_is_parsed() {
+    fn drop_count_is_parsed_from_the_kernel_table() {
         let table = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode ref pointer drops\n\
             \x20 311: 0100007F:1F90 00000000:0000 07 00000000:00034800 00:00000000 00000000     0        0 48213 2 0000000000000000 97\n";
         assert_eq!(of_inode(table, "48213"), Some(97));

@@ -1,4 +1,5 @@
-//! UDP to a bridge that answers only clients that have sent first. The kernel drops datagrams of other senders.
+//! UDP to a bridge, which sends only to clients that have sent to it first. The kernel drops datagrams of other
+//! senders.
 
 use std::io;
 use std::net::{ToSocketAddrs as _, UdpSocket};
@@ -24,7 +25,7 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Line>, OpenError> {
         let peer = address.to_socket_addrs()?.next().ok_or_else(none)?;
         let own = if peer.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
         let socket = UdpSocket::bind(own)?;
-        // A connected socket receives from the bridge only, and reports its absence.
+        // A connected socket receives only from the bridge, and reports an error if the bridge is absent.
         socket.connect(peer)?;
         let mut line = Udp { socket, timeout: ReadTimeout::default(), drops: SocketDrops::default() };
         line.knock()?;

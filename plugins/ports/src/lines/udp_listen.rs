@@ -1,8 +1,8 @@
-//! UDP from a device that sends to a local port, which accepts any sender.
+//! UDP from a device that sends to a local port, where any machine may send.
 //!
-//! One sender is accepted, pinned by address and port: the one of `?from=`, or the first whose message a driver of
-//! the line accepts. Data of others never reaches a driver, and nothing is sent to them. A device that falls silent
-//! may return from another port, but not from another address.
+//! Only one sender is accepted, by address and port. It is the sender given by `?from=`, or the first one whose
+//! message a driver of the line accepts. Drivers get no data of other senders, and other senders get no commands. A
+//! device that falls silent may return from another port, but not from another address.
 
 use std::collections::VecDeque;
 use std::io;
@@ -17,7 +17,7 @@ use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
 
-/// Number of senders whose bytes are held until one is valid; beyond it the oldest is forgotten.
+/// Maximum number of candidates whose bytes are kept until one is valid. Beyond it the oldest is forgotten.
 const MAX_CANDIDATES: usize = 8;
 
 struct UdpListen {
@@ -25,12 +25,12 @@ struct UdpListen {
     timeout: ReadTimeout,
     drops: SocketDrops,
     from: From,
-    /// Accepted sender, which also receives commands.
+    /// The accepted sender, to which commands are sent.
     peer: Option<SocketAddr>,
     candidates: VecDeque<Candidate>,
 }
 
-/// Configured sender.
+/// The sender given by the configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum From {
     Anybody,
@@ -38,7 +38,7 @@ enum From {
     Port(SocketAddr),
 }
 
-/// A sender without a valid message so far; its frames may arrive in parts.
+/// A sender that has not sent a valid message yet. Its frames may arrive in several datagrams.
 struct Candidate {
     from: SocketAddr,
     first: MonoNs,
@@ -68,19 +68,21 @@ fn resolved(from: &str) -> io::Result<From> {
 }
 
 impl UdpListen {
-    /// Whether a sender may be the device, valid or not.
+    /// Whether this sender may be the device, judged by address and port only.
     fn may_be(&self, from: SocketAddr, senders: &Senders) -> bool {
         match (self.from, senders.believed) {
             (From::Port(peer), _) => from == peer,
             (From::Host(host), _) => from.ip() == host,
-            // The sender before the line was reopened.
+            // After the line was reopened, the previous sender's address stays fixed.
             (From::Anybody, Some(before)) => from.ip() == before.ip(),
             (From::Anybody, None) => true,
         }
     }
 
-    /// Handles a datagram of a sender that may be the device. Once its bytes are valid, alone or with its earlier
-    /// ones, the sender is pinned and the valid bytes are in `into`.
+    /// Handles a datagram of a sender that may be the device.
+    ///
+    /// The sender is accepted once its bytes are valid, alone or together with its earlier bytes. The valid bytes are
+    /// then in `into`.
     fn introduce(
         &mut self,
         (received, from, count): (MonoNs, SocketAddr, usize),
@@ -112,7 +114,7 @@ impl UdpListen {
         Some((first, count))
     }
 
-    /// Adds to a candidate's bytes; returns their time and length if they are valid together.
+    /// Adds bytes to a candidate. If its bytes are now valid together, returns their receive time and length.
     fn hold(
         &mut self,
         received: MonoNs,
@@ -147,7 +149,7 @@ fn refuse(from: SocketAddr, messages: u64, senders: &mut Senders) {
 }
 
 impl Line for UdpListen {
-    /// Reads from any sender; only for probing.
+    /// Reads from any sender, which only probing needs.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
         self.read_device(wait, into, &mut Senders::default(), &|_| true)
     }
@@ -183,7 +185,7 @@ impl Line for UdpListen {
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // Without a device there is no destination.
+        // Commands have no destination before a device is accepted.
         self.peer.map_or(Ok(()), |peer| self.socket.send_to(bytes, peer).map(|_| ()))
     }
 
@@ -208,7 +210,7 @@ mod tests {
     const WAIT: Duration = Duration::from_secs(10);
     const NONE: Duration = Duration::from_millis(20);
 
-    /// Bytes are valid if they contain an `M`, further bytes, and then a `!`.
+    /// In these tests bytes are valid if they contain an `M` and, somewhere after it, a `!`.
     fn is_valid(bytes: &[u8]) -> bool {
         bytes.iter().position(|b| *b == b'M').is_some_and(|at| bytes[at..].contains(&b'!'))
     }
@@ -235,7 +237,7 @@ mod tests {
             from.send_to(text.as_bytes(), &self.address).unwrap();
         }
 
-        /// Content of the next accepted datagram, which must arrive.
+        /// Returns the next datagram if it is accepted; `None` if it is rejected or none arrives.
         fn heard(&mut self, wait: Duration) -> Option<String> {
             let mut into = [0; READ_BYTES];
             let read = self.line.read_device(wait, &mut into, &mut self.senders, &is_valid).unwrap();
@@ -319,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn configured_sender_is_the_only_one_accepted() {
+    fn only_the_configured_sender_is_accepted() {
         let device = sender();
         let mut place = Place::new(&device.local_addr().unwrap().to_string());
         let stranger = sender();
@@ -338,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn any_number_of_strangers_is_handled() {
+    fn device_is_accepted_after_any_number_of_other_senders() {
         let (mut place, device) = (Place::new(""), sender());
         for _ in 0..3 * MAX_CANDIDATES {
             place.tell(&sender(), "M");

@@ -1,7 +1,8 @@
 //! Bags of ROS 1.
 //!
-//! Source: ROS wiki, "Bags/Format/2.0". A record is a header of fields, each `name=value`, and data, both prefixed by their
-//! lengths; messages are in chunks, connection definitions in chunks and again at the end.
+//! Source: ROS wiki, "Bags/Format/2.0". A record consists of a header and data, each after its length. A header
+//! consists of fields `name=value`. Messages are in chunks. Definitions of connections are in chunks and again at the
+//! end of the bag.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
@@ -14,31 +15,31 @@ use crate::{Clock, Entry, Format, ImportError, ImportReport, Input, Source as _,
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Upper bound on the length of a header, bytes.
 const MOST_HEADER: usize = 1 << 16;
-/// Maximum number of bytes of the definitions at the end of a bag, which are read at once.
+/// Maximum number of bytes read of the definitions at the end of a bag.
 const MOST_INDEX: u64 = 64 << 20;
-/// Times below this, in 2001, are not UTC.
+/// Timestamps before this one, in 2001, don't count as UTC.
 pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
 
 const NO_RECORD: &str = "no bag record";
 
-/// A bag as a format; its streams are the sensors' ids.
+/// The bag format. Its streams are the sensors' ids.
 #[derive(Default)]
 pub struct Bag {
     feeds: Feeds,
     begun: bool,
-    /// Whether the position of the next record is unknown.
+    /// Whether the reader has lost the position of the next record.
     astray: bool,
     connections: BTreeMap<u32, Topic>,
-    /// The chunk being read, and the position in it.
+    /// The chunk being read.
     chunk: Option<Chunk>,
     first_ns: Option<u64>,
-    /// Counts in the bag header.
+    /// Counts stated in the bag's header.
     stated: Option<Stated>,
     chunks: u64,
     lost: BTreeMap<&'static str, u64>,
 }
 
-/// Facts stated in a bag's header.
+/// Index position and counts stated in the bag's header.
 #[derive(Debug, Clone, Copy)]
 struct Stated {
     index_at: u64,
@@ -46,31 +47,31 @@ struct Stated {
     chunks: u32,
 }
 
-/// An unpacked chunk, and the step to return after reading it.
+/// An unpacked chunk, the position reached in it, and the step to return at its end.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,
     step: Step,
 }
 
-/// A record: its fields, its data, and their total length.
+/// A record: its fields, its data, and its total length.
 struct Record<'a> {
     fields: Fields<'a>,
     data: &'a [u8],
     len: usize,
 }
 
-/// Kind of an accepted record.
+/// Result of accepting a record.
 enum Accepted<'a> {
-    /// A record without further content.
+    /// The record has been processed.
     Read,
-    /// A chunk with this compression.
+    /// The record is a chunk with this compression.
     Chunk(&'a [u8]),
 }
 
 /// Reason why a record can't be read.
 enum Stop<'a> {
-    /// It is incomplete: its fields and the available part of its data, if the fields are complete.
+    /// The record is incomplete. If its fields are complete, they are given with the available part of its data.
     More(Option<(Fields<'a>, &'a [u8])>),
     Bad,
 }
@@ -112,7 +113,7 @@ impl<'a> Fields<'a> {
         Some(u64::from_le_bytes(self.get(name)?.try_into().ok()?))
     }
 
-    /// Seconds, then nanoseconds.
+    /// Reads a time: seconds, then nanoseconds.
     fn time_ns(&self, name: &[u8]) -> Option<u64> {
         let (seconds, nanoseconds) = self.get(name)?.split_at_checked(4)?;
         let number = |bytes: &[u8]| Some(u64::from(u32::from_le_bytes(bytes.try_into().ok()?)));
@@ -124,7 +125,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Length-prefixed bytes, and the rest.
+/// Splits length-prefixed bytes from the rest.
 fn sized(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (len, rest) = bytes.split_first_chunk()?;
     rest.split_at_checked(usize::try_from(u32::from_le_bytes(*len)).ok()?)
@@ -136,11 +137,12 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
         len.map(|len| usize::try_from(len).unwrap_or(usize::MAX))
     };
     let header_len = length(front).ok_or(Stop::More(None))?;
-    // The shortest header has only its kind: a length, `op=` and a byte.
+    // The shortest header has one field with the kind of record: a length, `op=` and a byte.
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
-    // Out of sync, lengths are arbitrary, but a field name begins with a lower-case letter.
+    // After damage the lengths may be arbitrary. A field name begins with a lower-case letter, which rejects most of
+    // them.
     if front.get(8).is_some_and(|byte| !byte.is_ascii_lowercase()) {
         return Err(Stop::Bad);
     }
@@ -190,10 +192,10 @@ impl Format for Bag {
             Err(Stop::Bad) => Step::Lost(1, NO_RECORD),
             Err(Stop::More(None)) if was_astray => {
                 self.astray = true;
-                // Out of sync, an apparently long header is probably not one, but only the end of the file can tell.
+                // After damage a long header is probably not a header, but only the end of the file shows that.
                 if end { Step::Lost(1, NO_RECORD) } else { Step::More }
             }
-            // A chunk truncated by the end of the file may contain messages.
+            // A chunk that is cut off by the end of the file may still contain whole messages.
             Err(Stop::More(Some((fields, data)))) if end && fields.u8(b"op") == Some(5) => {
                 match fields.get(b"compression") {
                     Some(packing) => self.open(fields, data, packing, front.len(), true),
@@ -223,12 +225,12 @@ impl Format for Bag {
 }
 
 impl Bag {
-    /// Creates a bag whose messages go to `feeds`.
+    /// Creates a bag reader that passes messages to `feeds`.
     pub fn new(feeds: Feeds) -> Self {
         Self { feeds, ..Self::default() }
     }
 
-    /// Reads the topics of a bag from its index, or else by a scan of the whole bag.
+    /// Reads the topics of a bag from its index, or by a scan of the whole bag if the index is missing.
     ///
     /// Errors: the file can't be read, or isn't a bag.
     pub fn topics<R: Read + Seek>(name: &str, mut file: R) -> Result<Vec<Topic>, ImportError> {
@@ -292,14 +294,14 @@ impl Bag {
         })
     }
 
-    /// Processes a record. `None` if a required field of its kind is missing.
+    /// Processes a record. Returns `None` if it has no valid kind, or a field that its kind requires is missing.
     fn accept<'a>(&mut self, fields: Fields<'a>, data: &[u8], out: &mut Vec<Entry>) -> Option<Accepted<'a>> {
         match fields.u8(b"op")? {
             2 => self.message(fields.u32(b"conn")?, fields.time_ns(b"time")?, data, out),
             3 => self.stated = Some(Self::bag_header(fields)?),
             5 => return Some(Accepted::Chunk(fields.get(b"compression")?)),
             7 => self.connection(fields.u32(b"conn")?, fields, Fields(data))?,
-            // Indexes hold no messages; unknown kinds may be ignored.
+            // Index records hold no messages, and unknown kinds may be ignored.
             _ => (),
         }
         Some(Accepted::Read)
@@ -342,13 +344,13 @@ impl Bag {
         Step::Held
     }
 
-    /// Processes a record of the chunk.
+    /// Processes the next record of a chunk.
     fn read_on(&mut self, mut chunk: Chunk, out: &mut Vec<Entry>) -> Step {
         let rest = chunk.bytes.get(chunk.at..).unwrap_or_default();
         match record(rest) {
             _ if rest.is_empty() => return chunk.step,
             Ok(Record { fields, data, len }) => {
-                // A chunk contains no chunks.
+                // A chunk within a chunk is not allowed.
                 let taken = fields.u8(b"op") != Some(5) && self.accept(fields, data, out).is_some();
                 if !taken {
                     *self.lost.entry("records in chunks that no chunk may contain").or_default() += 1;

@@ -1,4 +1,4 @@
-//! Tests with generated bags.
+//! Tests of the bag reader with generated bags.
 
 use std::io::Cursor;
 
@@ -38,7 +38,7 @@ fn chunk(records: &[Vec<u8>]) -> Vec<u8> {
     whole(5, &[("compression", b"none"), ("size", &size)], &bytes)
 }
 
-/// A bag whose header states the number of chunks; its index starts at the first connection outside chunks.
+/// Builds a bag from chunks and index records. Its header states the start of the index, and the numbers of both.
 fn bag(chunks: &[Vec<u8>], index: &[Vec<u8>]) -> Vec<u8> {
     let header = |at: usize| {
         let connections = u32::try_from(index.len()).unwrap().to_le_bytes();
@@ -51,7 +51,7 @@ fn bag(chunks: &[Vec<u8>], index: &[Vec<u8>]) -> Vec<u8> {
     [header(at), chunks.concat(), index.concat()].concat()
 }
 
-/// Number of entries for no sensor, and the final report.
+/// Reads a bag; returns the number of its entries and the losses.
 fn read(file: &[u8]) -> (usize, Vec<String>) {
     let mut input = Input::new("bag", Cursor::new(file.to_vec()), Bag::default());
     let (mut order, mut count) = (Order::default(), 0);
@@ -68,20 +68,20 @@ fn three() -> [Vec<u8>; 2] {
 }
 
 #[test]
-fn bag_is_read_and_its_index_gives_the_topics() {
+fn bag_messages_and_topics_are_read() {
     let file = bag(&three(), &[connection(0, "/a")]);
     assert_eq!(read(&file), (3, Vec::new()));
     let topics = Bag::topics("bag", Cursor::new(&file)).unwrap();
     assert_eq!(topics.iter().map(|topic| topic.name.as_str()).collect::<Vec<_>>(), ["/a"]);
     assert_eq!(topics[0].known, Ok(Type::Float64));
-    // Without the index the whole bag is scanned.
+    // Without an index, the topics come from a scan of the whole bag.
     let cut = &file[..file.len() - 10];
     assert_eq!(Bag::topics("bag", Cursor::new(cut)).unwrap(), topics);
     assert!(Import::of(Input::new("bag", Cursor::new(MAGIC), Bag::default()), "message").is_err());
 }
 
 #[test]
-fn damage_loses_only_its_chunk_and_is_named() {
+fn damaged_chunk_loses_only_itself_and_is_reported() {
     let [first, second] = three();
     let mut broken = second.clone();
     let at = broken.windows(4).position(|window| window == b"none").unwrap();
@@ -120,7 +120,7 @@ fn bag_cut_anywhere_delivers_messages_before_the_cut() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_parsed_or_counted_as_lost(
+    fn any_bytes_are_read_as_a_bag_without_a_panic(
         bytes in proptest::collection::vec(any::<u8>(), 0..600),
         at in 0_usize..400,
     ) {

@@ -1,23 +1,23 @@
-//! Compares the header timestamps of messages with the record times.
+//! Compares the timestamps in message headers with the times at which the messages were recorded.
 
-/// A timestamp later than the record time by more than this comes from another clock.
+/// Lead over the record time above which a timestamp must come from another clock.
 const AHEAD_NS: i64 = 5_000_000;
-/// Greatest recording delay of messages from a computer with a synchronised clock.
+/// Maximum recording delay of messages from a computer with a synchronised clock.
 const LATE_NS: i64 = 1_000_000_000;
-/// Greatest variation of that delay.
+/// Maximum variation of the recording delay.
 const VARIES_NS: i64 = 500_000_000;
-/// Offset above which the clock has another epoch rather than an error.
+/// Offset between clocks above which their epochs differ. Smaller offsets are clock errors.
 const OTHER_BASE_NS: i64 = 3_600_000_000_000;
-/// Deviation of a followed timestamp above which the offset restarts.
+/// Deviation from the present offset above which a new offset begins.
 const ASTRAY_NS: i64 = 10_000_000_000;
 
-/// Source of the time of a message's values.
+/// Choice of the time that applies to a message's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Base {
-    /// The time of recording.
+    /// The time at which the message was recorded.
     #[default]
     Record,
-    /// The timestamp in its header.
+    /// The timestamp in the message's header.
     Header,
 }
 
@@ -26,13 +26,13 @@ pub(super) enum Base {
 pub(super) struct Clocks {
     base: Base,
     messages: u64,
-    /// Messages with a zero timestamp.
+    /// Number of messages with a zero timestamp.
     unstamped: u64,
-    /// Least and greatest record time minus timestamp.
+    /// Least and greatest difference of record time minus timestamp.
     lag_ns: Option<(i64, i64)>,
     before_ns: u64,
     backwards: u64,
-    /// Offset added to followed timestamps of another epoch.
+    /// Offset added to timestamps, if they are used and their epoch differs.
     moved_ns: Option<i64>,
     anew: u64,
 }
@@ -42,7 +42,7 @@ impl Clocks {
         Self { base, ..Self::default() }
     }
 
-    /// The time of a message's values, and whether it comes from the timestamp.
+    /// Returns the time of a message's values, and whether it comes from the header's timestamp.
     pub(super) fn time(&mut self, record_ns: u64, stamp_ns: Option<u64>) -> (u64, bool) {
         self.messages += 1;
         let Some(stamp_ns) = stamp_ns.filter(|stamp_ns| *stamp_ns > 0) else {
@@ -67,7 +67,7 @@ impl Clocks {
         (stamp_ns.saturating_add_signed(near), true)
     }
 
-    /// Findings for the user, as text.
+    /// Returns the findings for the user, as text.
     pub(super) fn words(&self) -> Vec<String> {
         let mut all = Vec::new();
         if self.messages == 0 {
@@ -122,7 +122,7 @@ impl Clocks {
 
 fn difference(one_ns: u64, other_ns: u64) -> i64 {
     let difference = i128::from(one_ns) - i128::from(other_ns);
-    // Limited to half the range, so that two values can be subtracted.
+    // Half the range of i64, so that the difference of two values still fits.
     let most = i128::from(i64::MAX / 2);
     i64::try_from(difference.clamp(-most, most)).unwrap_or_default()
 }
@@ -149,14 +149,14 @@ mod tests {
     }
 
     #[test]
-    fn agreeing_stamps_give_no_findings() {
+    fn agreeing_timestamps_give_no_findings() {
         let (times, said) = words(Base::Record, &[(1000 * S, 1000 * S - 3), (1001 * S, 1001 * S - 900)]);
         assert_eq!((times, said.as_str()), (vec![1000 * S, 1001 * S], ""));
         assert_eq!(words(Base::Header, &[(1000 * S, 1000 * S - 3)]).0, [1000 * S - 3]);
     }
 
     #[test]
-    fn another_time_base_is_named_and_shifted() {
+    fn timestamps_of_another_epoch_are_reported_and_shifted() {
         let pairs = [(50_000 * S, 10 * S), (50_001 * S, 10 * S + 900_000_000)];
         let (times, said) = words(Base::Record, &pairs);
         assert_eq!(times, [50_000 * S, 50_001 * S]);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn clock_offsets_are_named() {
+    fn clock_offsets_are_reported() {
         assert!(words(Base::Record, &[(10 * S, 11 * S)]).1.contains("up to 1.000 s later"));
         assert!(
             words(Base::Record, &[(10 * S, 8 * S)])

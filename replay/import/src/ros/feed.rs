@@ -1,4 +1,4 @@
-//! A topic and the sensor that its messages belong to.
+//! Converts the messages of a topic for the sensor that they belong to.
 
 use std::collections::BTreeMap;
 
@@ -12,11 +12,11 @@ use super::wire::Encoding;
 use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::{Entry, ImportReport};
 
-/// A mapping's settings for a topic, apart from its sensor.
+/// Settings of a topic in the mapping, apart from its sensor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Manner {
     pub(super) base: Base,
-    /// For pressures and lengths: factor of their unit to SI.
+    /// Factor that converts a pressure or length to SI units.
     pub(super) unit: f64,
     pub(super) plane: Plane,
 }
@@ -27,7 +27,7 @@ impl Default for Manner {
     }
 }
 
-/// Converts the messages of a topic.
+/// Converter of one topic's messages.
 pub(super) struct Feed {
     of: Type,
     sensor: EmulatedSensor,
@@ -35,15 +35,15 @@ pub(super) struct Feed {
     clocks: Clocks,
     taken: u64,
     frame_id: Option<Vec<u8>>,
-    /// Messages with another frame than the first.
+    /// Number of messages with another frame than the first message.
     other_frames: u64,
-    /// Sum of the specific force along z, m/s^2.
+    /// Sum of the specific force along z over all messages, m/s^2.
     upward_mps2: f64,
-    /// Highest pressure, Pa.
+    /// Highest pressure so far, Pa.
     highest_pa: f64,
-    /// Lost messages by reason.
+    /// Number of lost messages, points or ranges, by reason.
     lost: BTreeMap<&'static str, u64>,
-    /// Remarks that aren't losses.
+    /// Counts of remarks that aren't losses.
     noted: BTreeMap<&'static str, u64>,
 }
 
@@ -79,7 +79,7 @@ impl Feed {
         &self.sensor.id
     }
 
-    /// Processes a message.
+    /// Converts a message into entries. Counts it as lost if that fails.
     pub(super) fn take(&mut self, encoding: Encoding, record_ns: u64, bytes: &[u8], out: &mut Vec<Entry>) {
         self.taken += 1;
         let taken = read(self.of, encoding, bytes).and_then(|read| self.values(&read, record_ns, out));
@@ -115,7 +115,7 @@ impl Feed {
         self.say((at_ns, stamped), &value, out)
     }
 
-    /// Converts an inertial message. Missing parts are omitted, but at least one must be present.
+    /// Converts an inertial message. Parts may be missing, but not all of them.
     fn inertia(
         &mut self,
         wxyz: Option<[f64; 4]>,
@@ -150,9 +150,9 @@ impl Feed {
         Ok(Value::Inertia(attitude, rate.unwrap_or(unknown), force.unwrap_or(unknown)))
     }
 
-    /// Converts a message's beams.
+    /// Converts the beams of a message.
     ///
-    /// The message is recorded when the last beam has been measured; its timestamp is that of the first.
+    /// The message is recorded after the last beam was measured. Its timestamp is the time of the first beam.
     fn beams(&mut self, beams: &Beams, at: (u64, bool), out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let told = beams.told(self.manner.plane)?;
         for (count, what) in [(told.nowhere, "points without a position: no echo, at an unknown angle")] {
@@ -185,9 +185,10 @@ impl Feed {
         if unsaid > 0 { Err("with beams that the sensor can't encode") } else { Ok(()) }
     }
 
-    /// Encodes a value.
+    /// Encodes a value as entries.
     ///
-    /// Values with a timestamp are received after the sensor's delays; those without, at the time of recording.
+    /// A value timed by its header is received after the sensor's own delays. A value timed by the recording is
+    /// received at the time of recording.
     fn say(
         &mut self,
         (at_ns, stamped): (u64, bool),
@@ -202,7 +203,7 @@ impl Feed {
         if said { Ok(()) } else { Err("with values that the sensor can't encode") }
     }
 
-    /// Reports losses and remarks.
+    /// Adds losses and remarks to the report.
     pub(super) fn tell(&self, topic: &str, told: &mut ImportReport) {
         let counted = |counts: &BTreeMap<&'static str, u64>| -> Vec<String> {
             counts.iter().map(|(why, count)| format!("{topic}: {count} {}{why}", messages(why))).collect()
@@ -239,7 +240,7 @@ impl Feed {
     }
 }
 
-/// The unit counted by a reason: messages, unless the reason begins with another unit.
+/// Returns the unit that a reason counts: messages, unless the reason itself begins with another unit.
 fn messages(why: &str) -> &'static str {
     if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
 }

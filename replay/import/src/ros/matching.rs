@@ -1,4 +1,4 @@
-//! Assigns topics to sensors: by a mapping, or if the choice is unique.
+//! Assigns topics to sensors, either by a mapping, or automatically where only one assignment is possible.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -12,7 +12,7 @@ use super::{Feeds, Topic};
 use crate::csv::{LENGTH, PRESSURE};
 use crate::emulated::EmulatedSensor;
 
-/// Topics and sensors can't be matched.
+/// Reason why topics can't be assigned to sensors.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
@@ -24,19 +24,19 @@ pub enum MatchError {
         "can't tell which {sense} sends which topic: topics {topics}, sensors {sensors}; assign them with --map MAPPING.toml"
     )]
     Several {
-        /// The kind of measurement.
+        /// The kind of measurement that has several topics or sensors.
         sense: &'static str,
-        /// The topics.
+        /// The topics of this kind.
         topics: String,
-        /// The sensors.
+        /// The sensors of this kind.
         sensors: String,
     },
     /// No assignment is possible.
     #[error("no topic belongs to a sensor of the vehicle file: topics {topics}; sensors {sensors}")]
     None {
-        /// The topics, their types, and their problems.
+        /// The topics, each with its type and its problem.
         topics: String,
-        /// The sensors and what they sense.
+        /// The sensors, each with its kind of measurement.
         sensors: String,
     },
 }
@@ -49,9 +49,9 @@ const MOST_SHOWN: usize = 20;
 impl Feeds {
     /// Assigns topics without a mapping.
     ///
-    /// A sensor and a topic of a fitting type are matched if each is the only one of its kind.
+    /// A sensor and a topic are matched if each is the only one for its kind of measurement.
     ///
-    /// Errors: several of a kind, or none.
+    /// Errors: several topics or sensors of a kind, or none.
     pub fn matching(vehicle: &VehicleConfig, topics: &[Topic]) -> Result<Self, MatchError> {
         let mut feeds = Self::default();
         for sense in SENSES {
@@ -88,9 +88,9 @@ impl Feeds {
         Ok(feeds)
     }
 
-    /// Assigns topics by a mapping only.
+    /// Assigns topics by a mapping alone.
     ///
-    /// Errors: a key with an invalid value, an unknown sensor or topic, or a sensor and topic of different kinds.
+    /// Errors: a key has an invalid value, a sensor or topic is unknown, or a topic doesn't fit its sensor's kind.
     pub fn mapped(
         mapping: &Section<'_>,
         vehicle: &VehicleConfig,

@@ -1,6 +1,7 @@
-//! Recordings of ROS 2 in MCAP, and those of ROS 1 converted to MCAP.
+//! Recordings of ROS 2 in MCAP, and recordings of ROS 1 that were converted to MCAP.
 //!
-//! Sources: MCAP format specification and its "well-known" profiles and encodings. The log reader parses MCAP itself.
+//! Sources: MCAP format specification, and its "well-known" profiles and encodings. The log reader parses MCAP
+//! itself.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -13,7 +14,7 @@ use crate::{Clock, Entry, ImportError, Source};
 use headrace_replay::log::format::FORMAT_KEY;
 use headrace_replay::log::{ChannelInfo, LogReader};
 
-/// Messages per read.
+/// Maximum number of messages per read.
 const AT_A_TIME: usize = 64;
 
 /// A recording in MCAP.
@@ -25,7 +26,7 @@ pub struct Mcap<R> {
     feeds: Feeds,
     found: Vec<Entry>,
     first_ns: Option<u64>,
-    /// Number of messages stated in its summary; `None` if the summary doesn't state it.
+    /// Number of messages that the recording's summary states; `None` if it states none.
     stated: Option<u64>,
     /// Number of messages read.
     read: u64,
@@ -39,7 +40,7 @@ impl<R: Read + Seek> Mcap<R> {
     pub fn open(name: &str, mut file: R) -> Result<Self, ImportError> {
         let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
         let bytes = file.seek(std::io::SeekFrom::End(0)).map_err(failed)?;
-        // The log reader reports anything unreadable.
+        // If this fails, the log reader reports what is unreadable.
         let stated = stated_messages(&mut file, bytes).ok().flatten();
         let reader = LogReader::new(file, name.to_owned())?;
         if reader.header().metadata.contains_key(FORMAT_KEY) {
@@ -60,7 +61,7 @@ impl<R: Read + Seek> Mcap<R> {
         })
     }
 
-    /// Its topics.
+    /// Returns the topics of the recording.
     pub fn topics(&self) -> Vec<Topic> {
         let mut topics: Vec<Topic> = Vec::new();
         for (topic, _) in self.channels.values() {
@@ -71,7 +72,7 @@ impl<R: Read + Seek> Mcap<R> {
         topics
     }
 
-    /// Routes its messages to `feeds`.
+    /// Sets the feeds that receive the recording's messages.
     #[must_use]
     pub fn feeding(self, feeds: Feeds) -> Self {
         Self { feeds, ..self }

@@ -1,7 +1,7 @@
-//! The known message types, and the sensor values taken from them.
+//! Known message types, and the sensor values that they contain.
 //!
-//! Sources: the .msg files of ROS' common_interfaces (sensor_msgs, geometry_msgs, std_msgs), REP 103 (axes and units),
-//! REP 117 (ranges), REP 145 (inertial units).
+//! Sources: the .msg files of ROS' common_interfaces (sensor_msgs, geometry_msgs, std_msgs), REP 103 (axes and
+//! units), REP 117 (ranges), REP 145 (inertial units).
 
 use headrace_sensor::device::Sense;
 
@@ -12,17 +12,17 @@ use super::wire::{Encoding, Header, Wire};
 /// A type of message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Type {
-    /// Attitude, turn rate, specific force.
+    /// Attitude, turn rate and specific force.
     Imu,
     /// One distance.
     Range,
     /// Pressure.
     FluidPressure,
-    /// Ranges by angle about an axis.
+    /// Ranges at equally spaced angles about an axis.
     LaserScan,
-    /// Points, by fields.
+    /// Points with named fields.
     PointCloud2,
-    /// Points.
+    /// Points with x, y and z.
     PointCloud,
     /// Velocity.
     Twist,
@@ -34,7 +34,7 @@ pub enum Type {
     Float64,
 }
 
-/// Types, their names and the MD5 of their definitions in ROS 1.
+/// All types, each with its name, and the MD5 of its definition in ROS 1.
 const TYPES: [(Type, &str, &str); 10] = [
     (Type::Imu, "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"),
     (Type::Range, "sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148"),
@@ -53,18 +53,19 @@ const TYPES: [(Type, &str, &str); 10] = [
 ];
 
 impl Type {
-    /// Finds a type by its name, as written by ROS 1 or ROS 2 (`sensor_msgs/msg/Imu`).
+    /// Finds a type by its name in the form of ROS 1 (`sensor_msgs/Imu`) or ROS 2 (`sensor_msgs/msg/Imu`).
     pub(super) fn named(name: &str) -> Option<Self> {
         let name = name.replacen("/msg/", "/", 1);
         TYPES.iter().find(|(_, known, _)| *known == name).map(|(known, ..)| *known)
     }
 
-    /// Whether a ROS 1 definition is the known one; `*` means an unknown definition.
+    /// Whether a ROS 1 definition with this MD5 is the expected one. `*` stands for an unknown MD5, which is
+    /// accepted.
     pub(super) fn is_defined_as(self, md5: &str) -> bool {
         md5 == "*" || TYPES.iter().any(|(known, _, known_md5)| *known == self && *known_md5 == md5)
     }
 
-    /// Kind of sensor to which it may belong.
+    /// Returns the kind of sensor that sends this type of message.
     pub(super) fn sense(self) -> Sense {
         match self {
             Self::Imu => Sense::Inertial,
@@ -76,16 +77,16 @@ impl Type {
         }
     }
 
-    /// Whether the type identifies its quantity: a bare number may be anything.
+    /// Whether the type states what was measured. A bare number may be anything.
     pub(super) fn is_telling(self) -> bool {
         !matches!(self, Self::Float32 | Self::Float64)
     }
 }
 
-/// A message's values, in its units and axes.
+/// Values of a message, in the units and axes of its type.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Values {
-    /// Parts that the sender marks as missing are `None`.
+    /// Inertial values. Parts that the sender marks as missing are `None`.
     Inertial {
         wxyz: Option<[f64; 4]>,
         rate_radps: Option<[f64; 3]>,
@@ -93,13 +94,13 @@ pub(super) enum Values {
     },
     /// A range; `None` without an echo.
     Range(Option<f64>),
-    /// A pressure, or a length of cable: in the mapping's unit, by default SI.
+    /// A pressure, or a length of cable, in the mapping's unit, which is SI by default.
     Scalar(f64),
     Velocity([f64; 3]),
     Beams(Beams),
 }
 
-/// A message: its timestamp and frame if it has them, and its values.
+/// A parsed message: its header, if its type has one, and its values.
 pub(super) struct Read<'a> {
     pub(super) header: Option<Header<'a>>,
     pub(super) values: Values,
@@ -107,7 +108,7 @@ pub(super) struct Read<'a> {
 
 /// Parses a message.
 ///
-/// Errors: as text, why it isn't of its type.
+/// Errors: the reason, as text, why it doesn't fit its type.
 pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_>, &'static str> {
     let mut wire = Wire::new(bytes, encoding).ok_or("in another encapsulation than plain CDR")?;
     let read =
@@ -146,7 +147,7 @@ fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static
     Some(Ok(Read { header, values }))
 }
 
-/// Parses an inertial message. A covariance that begins with -1 marks a missing value.
+/// Parses an inertial message. A covariance whose first element is -1 marks a missing value.
 fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
     let [x, y, z, w] = wire.doubles()?;
     let told = |covariance: [f64; 9]| covariance.first().is_none_or(|first| !is_minus_one(*first));
@@ -156,7 +157,7 @@ fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
     let force: [f64; 3] = wire.doubles()?;
     let force_mps2 = told(wire.doubles()?).then_some(force);
     let whole = |values: &[f64]| values.iter().all(|value| value.is_finite());
-    // All zeros is the default of a sender without an orientation.
+    // Senders without an orientation leave its default, which is all zeros.
     let wxyz = wxyz.filter(|wxyz| whole(wxyz) && wxyz.iter().any(|part| part.abs() > 0.0));
     Some(Values::Inertial {
         wxyz,
@@ -172,7 +173,7 @@ fn is_minus_one(value: f64) -> bool {
 fn range(wire: &mut Wire<'_>) -> Option<Values> {
     let _radiation = wire.u8()?;
     let [_field_of_view, least, most, range] = wire.singles()?;
-    // The variance, which newer definitions append.
+    // Newer definitions append a variance.
     if !wire.is_done() {
         wire.f32()?;
     }
@@ -184,7 +185,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn types_are_found_by_both_names() {
+    fn message_types_are_found_by_ros_1_and_ros_2_names() {
         assert_eq!(Type::named("sensor_msgs/Imu"), Some(Type::Imu));
         assert_eq!(Type::named("sensor_msgs/msg/LaserScan"), Some(Type::LaserScan));
         assert_eq!(Type::named("sensor_msgs/Image"), None);
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_lengths_are_named() {
+    fn messages_of_wrong_length_are_refused() {
         let whole = [[0; 16].as_slice(), &[0; 37 * 8]].concat();
         assert!(read(Type::Imu, Encoding::Ros1, &whole).is_ok());
         assert!(read(Type::Imu, Encoding::Ros1, &whole[1..]).err().unwrap().contains("shorter"));

@@ -1,7 +1,7 @@
-//! Recordings of ROS: messages of known types become the bytes that sensors of the vehicle file would have sent.
+//! Recordings of ROS. Messages of known types become the bytes that the vehicle file's sensors would have sent.
 //!
-//! [`bag`] reads bags of ROS 1, [`mcap`] those of ROS 2. Both pass messages to [`Feeds`], which assigns topics to
-//! sensors by a mapping, or if the choice is unique.
+//! [`bag`] reads bags of ROS 1, [`mcap`] reads recordings of ROS 2. Both pass messages to [`Feeds`], which assigns
+//! topics to sensors by a mapping, or where only one assignment is possible.
 
 pub mod bag;
 mod clocks;
@@ -29,34 +29,38 @@ use feed::Feed;
 /// A topic of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topic {
-    /// Its name.
+    /// Name of the topic.
     pub name: String,
-    /// Name of its message type.
+    /// Name of the message type.
     pub type_name: String,
-    /// The type, if known and readable; otherwise the reason why not.
+    /// Message type, if it is supported; otherwise the reason why it isn't.
     pub known: Result<Type, String>,
 }
 
-/// Assigns topics to sensors.
+/// Sensors that receive the messages of topics.
 #[derive(Default)]
 pub struct Feeds {
     by_topic: BTreeMap<String, Feed>,
-    /// Automatic matches, as text.
+    /// Assignments made without a mapping, as text.
     matched: Vec<String>,
 }
 
 impl Feeds {
-    /// Automatic matches, as text.
+    /// Returns the assignments made without a mapping, as text.
     pub fn matched(&self) -> &[String] {
         &self.matched
     }
 
-    /// Greatest age of values at their message, ns. The beams of a head's whole turn come in one message.
+    /// Returns how old values may be when their message is recorded, ns.
+    ///
+    /// One message may contain the beams of a head's whole turn.
     pub(super) fn reach_ns(&self) -> u64 {
         if self.by_topic.values().any(Feed::is_of_head) { 40_000_000_000 } else { WINDOW_NS }
     }
 
-    /// Processes a message. Messages of other topics, or of another type than their topic's, belong to no sensor.
+    /// Processes a message.
+    ///
+    /// Messages of unassigned topics belong to no sensor. Neither do messages of another type than their topic's.
     pub(super) fn take(
         &mut self,
         topic: &Topic,
@@ -68,7 +72,7 @@ impl Feeds {
         let feed = self.by_topic.get_mut(&topic.name);
         match feed.filter(|feed| topic.known.as_ref().is_ok_and(|known| feed.is_of(*known))) {
             Some(feed) => feed.take(encoding, record_ns, bytes, out),
-            // Counted as belonging to no sensor.
+            // This entry is counted as belonging to no sensor.
             None => out.push(Entry { stamp_ns: record_ns, stream: String::new(), bytes: Vec::new() }),
         }
     }

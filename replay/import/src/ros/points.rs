@@ -1,65 +1,67 @@
-//! Scans and point clouds of a profiling head as beams: angle, range and time.
+//! Converts scans and point clouds of a profiling head to beams: angle, range and time.
 //!
-//! A scan turns about its own z axis, counted from x towards y. The head's x is that axis, the head's zero angle (down,
-//! -z) is the scan's x, and the head's y is the scan's y. A cloud's points are in the head's own frame with the beam in
-//! the plane of y and z, unless the mapping says `xy`.
+//! A scan turns about its own z axis, counted from x towards y. This axis is the head's x. The scan's x is the head's
+//! zero angle (down, -z), and the scan's y is the head's y.
+//!
+//! The points of a cloud are in the head's own frame, with the beam in the plane of y and z. With `xy` in the mapping
+//! they are in the frame of a scan.
 
 use headrace_geometry::math;
 
 use super::ranges::heard;
 use super::wire::Wire;
 
-/// Upper bound on the number of beams in a head's turn.
+/// Maximum number of beams in a head's turn.
 const MOST_BEAMS: usize = 1 << 16;
-/// Longest time offset within a message, s.
+/// Maximum time between a beam and its message's timestamp, s.
 const LONGEST_S: f64 = 120.0;
-/// Greatest distance of a point from the beam's plane, as a share of its range.
+/// Maximum distance of a point from the beam's plane, as a share of the point's range.
 const OFF_PLANE: f64 = 0.1;
 
-/// One beam.
+/// A beam of a head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Beam {
-    /// As [`headrace_sensor::reading::SonarReturn::angle_rad`].
+    /// Angle of the beam, as in [`headrace_sensor::reading::SonarReturn::angle_rad`].
     pub(super) angle_rad: f64,
-    /// `None` without an echo.
+    /// Range; `None` without an echo.
     pub(super) range_m: Option<f64>,
-    /// Time after the message's timestamp.
+    /// Time after the message's timestamp, s.
     pub(super) after_s: f64,
 }
 
-/// Plane of rotation of a beam.
+/// Plane in which a beam rotates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Plane {
-    /// The head's own axes.
+    /// Plane of y and z, in the head's own axes.
     Yz,
-    /// The axes of a laser scanner.
+    /// Plane of x and y, in the axes of a laser scanner.
     Xy,
 }
 
-/// Beams in a message.
+/// Beams of a message, not checked yet.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Beams {
-    /// Beams with given angles, not checked yet.
+    /// Beams with their angles.
     Turned(Vec<Beam>),
-    /// Points, with time after the timestamp, s.
+    /// Points, each with its time after the message's timestamp, s.
     Points(Vec<([f64; 3], f64)>),
 }
 
-/// The valid beams, and counts of the others.
+/// Valid beams of a message, and counts of the invalid points.
 #[derive(Debug, Default)]
 pub(super) struct Told {
-    /// Sorted by time.
+    /// Beams, sorted by time.
     pub(super) beams: Vec<Beam>,
-    /// Points outside the plane.
+    /// Number of points outside the beam's plane.
     pub(super) off_plane: u64,
-    /// Points that are NaN or at the origin: no echo in an unknown direction.
+    /// Number of points that are NaN or at the origin, which means no echo at an unknown angle.
     pub(super) nowhere: u64,
 }
 
 impl Beams {
-    /// The valid beams in a head's axes.
+    /// Returns the valid beams, in the axes of a head.
     ///
-    /// Errors: as text, why they can't be a head's.
+    /// Errors: the reason, as text, why the beams can't be those of a head.
     pub(super) fn told(&self, plane: Plane) -> Result<Told, &'static str> {
         let mut told = Told::default();
         match self {
@@ -76,7 +78,7 @@ impl Beams {
             }
         }
         if told.beams.len() > MOST_BEAMS {
-            return Err("with more than 65536 beams, which no head makes");
+            return Err("with more than 65536 beams, the maximum for a turn of a head");
         }
         if told.beams.iter().any(|beam| !(-LONGEST_S..=LONGEST_S).contains(&beam.after_s)) {
             return Err("whose beams take more than 120 s");
@@ -104,14 +106,14 @@ impl Told {
     }
 }
 
-/// Parses a sensor_msgs/LaserScan after its header.
+/// Parses a sensor_msgs/LaserScan, after its header.
 pub(super) fn scan(wire: &mut Wire<'_>) -> Option<Beams> {
     let [first, _last, step, each_s, _scan_s, least, most] = wire.singles()?;
     let ranges = wire.single_sequence()?;
     let _strengths = wire.single_sequence()?;
     let beam = |(number, range): (u32, &f32)| {
         let number = f64::from(number);
-        // The step of a scan with one beam may be zero.
+        // A scan with a single beam may have any step, even an infinite one, which must not be multiplied by zero.
         let turned = |each: f64| if number > 0.0 { number * each } else { 0.0 };
         Beam {
             angle_rad: first + turned(step),
@@ -122,7 +124,7 @@ pub(super) fn scan(wire: &mut Wire<'_>) -> Option<Beams> {
     Some(Beams::Turned((0..).zip(&ranges).map(beam).collect()))
 }
 
-/// Parses a sensor_msgs/PointCloud after its header.
+/// Parses a sensor_msgs/PointCloud, after its header.
 pub(super) fn points(wire: &mut Wire<'_>) -> Option<Beams> {
     let count = wire.count(12)?;
     let points = (0..count).map(|_| Some((wire.singles()?, 0.0))).collect::<Option<Vec<_>>>()?;
@@ -132,7 +134,7 @@ pub(super) fn points(wire: &mut Wire<'_>) -> Option<Beams> {
     Some(Beams::Points(points))
 }
 
-/// Encoding of a number in a point of sensor_msgs/PointCloud2.
+/// Encoding of a number in a sensor_msgs/PointCloud2.
 #[derive(Debug, Clone, Copy)]
 enum Number {
     U32,
@@ -140,21 +142,21 @@ enum Number {
     F64,
 }
 
-/// A field of a point.
+/// Offset and encoding of a field in a point.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     offset: usize,
     number: Number,
 }
 
-/// Unit and epoch of a time field.
+/// Unit of a point's time, and the time from which it counts.
 #[derive(Debug, Clone, Copy)]
 enum Time {
-    /// Nanoseconds after the timestamp.
+    /// Nanoseconds after the message's timestamp.
     After,
-    /// Seconds after the timestamp.
+    /// Seconds after the message's timestamp.
     AfterSeconds,
-    /// Seconds on the timestamp's clock.
+    /// Seconds on the clock of the message's timestamp.
     Seconds,
 }
 
@@ -178,7 +180,7 @@ impl Field {
     }
 }
 
-/// The fields of a cloud that are used.
+/// Fields of a cloud that the conversion uses.
 #[derive(Debug, Default)]
 struct Layout {
     place: [Option<Field>; 3],
@@ -186,8 +188,9 @@ struct Layout {
 }
 
 impl Layout {
-    /// Adds a field. Drivers of Ouster (`t`), Velodyne (`time`) and Hesai (`timestamp`) use these names for a point's
-    /// time.
+    /// Adds a field if the conversion uses it.
+    ///
+    /// A point's time is called `t` by Ouster's driver, `time` by Velodyne's and `timestamp` by Hesai's.
     fn add(&mut self, name: &[u8], offset: usize, datatype: u8) {
         let number = match datatype {
             6 => Number::U32,
@@ -222,7 +225,7 @@ impl Layout {
     }
 }
 
-/// Parses a sensor_msgs/PointCloud2 after its header.
+/// Parses a sensor_msgs/PointCloud2, after its header.
 pub(super) fn cloud(wire: &mut Wire<'_>, stamp_ns: u64) -> Option<Result<Beams, &'static str>> {
     let (height, width) = (usize::try_from(wire.u32()?).ok()?, usize::try_from(wire.u32()?).ok()?);
     let mut layout = Layout::default();
@@ -239,7 +242,7 @@ pub(super) fn cloud(wire: &mut Wire<'_>, stamp_ns: u64) -> Option<Result<Beams, 
     }
     let count = height.checked_mul(width)?;
     if count > MOST_BEAMS {
-        return Some(Err("with more than 65536 beams, which no head makes"));
+        return Some(Err("with more than 65536 beams, the maximum for a turn of a head"));
     }
     let mut points = Vec::new();
     for row in 0..height.min(count) {
@@ -264,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_give_the_beam_angles_of_the_head() {
+    fn points_are_converted_to_beam_angles_of_the_head() {
         for quarter in -3_i32..=4 {
             let angle_rad = f64::from(quarter) * FRAC_PI_2 / 2.0;
             let at = head_direction(angle_rad).scaled(3.0);
@@ -272,14 +275,14 @@ mod tests {
             let beam = told.beams[0];
             assert!((beam.angle_rad - angle_rad).abs() < 1e-12, "{angle_rad}: {beam:?}");
             assert!((beam.range_m.unwrap() - 3.0).abs() < 1e-12);
-            // As seen by a scanner whose x is the head's zero angle and whose y is the head's y.
+            // The same point in the axes of a scanner: x is the head's zero angle, and y is the head's y.
             let told = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).told(Plane::Xy).unwrap();
             assert!((told.beams[0].angle_rad - angle_rad).abs() < 1e-12);
         }
     }
 
     #[test]
-    fn points_outside_all_beams_are_counted() {
+    fn invalid_and_off_plane_points_are_counted() {
         let all = [[3.0, 0.0, 1.0], [0.0, f64::NAN, 1.0], [0.0; 3], [0.0, 1.0, 1.0]];
         let told = Beams::Points(all.map(|point| (point, 0.0)).to_vec()).told(Plane::Yz).unwrap();
         assert_eq!((told.beams.len(), told.off_plane, told.nowhere), (1, 1, 2));

@@ -1,4 +1,4 @@
-//! Reads the number of messages that an MCAP file states in its summary.
+//! Reads the number of messages that the summary of an MCAP file states.
 //!
 //! Source: MCAP format specification, "Footer" and "Statistics".
 
@@ -7,14 +7,16 @@ use std::io::{BufReader, Read, Result, Seek, SeekFrom};
 const STATISTICS: u8 = 0x0B;
 const FOOTER: u8 = 0x02;
 const FOOTER_BYTES: u64 = 20;
-/// Opcode and length of a record.
+/// Length of a record's opcode and length field, bytes.
 const HEAD_BYTES: u64 = 9;
-/// Length of the footer's record and the closing magic, bytes.
+/// Length of the footer record and the closing magic, bytes.
 const END_BYTES: u64 = HEAD_BYTES + FOOTER_BYTES + 8;
-/// Maximum number of records of a summary that are skipped; a recording of a day has some thousands of chunks.
+/// Maximum number of records skipped in a summary. A recording of a day has some thousands of chunks.
 const MOST_RECORDS: usize = 100_000;
 
-/// Number of messages in a file of `bytes` bytes; `None` without a summary, or without statistics in it.
+/// Returns the number of messages stated in a file of `bytes` bytes.
+///
+/// Returns `None` without a summary, or without statistics in it.
 ///
 /// Errors: the file can't be read.
 pub(super) fn stated_messages(file: &mut (impl Read + Seek), bytes: u64) -> Result<Option<u64>> {
@@ -72,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn message_count_is_found_after_other_records() {
+    fn stated_message_count_is_found_after_other_records() {
         let statistics = record(STATISTICS, &[&1234_u64.to_le_bytes()[..], &[0; 38]].concat());
         let other = record(0x08, &[7; 100]);
         assert_eq!(stated(&[&other[..], &other, &statistics].concat(), 50), Some(1234));
@@ -80,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn files_without_statistics_state_nothing() {
+    fn files_without_statistics_have_no_message_count() {
         let endless = [&[0x08][..], &u64::MAX.to_le_bytes(), &[7; 100]].concat();
         for (summary, at) in [(&record(0x08, &[7; 100])[..], 50), (&[], 0), (&endless, 50), (&[], u64::MAX)] {
             assert_eq!(stated(summary, at), None);

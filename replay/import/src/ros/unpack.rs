@@ -2,23 +2,23 @@
 
 use std::io::Read;
 
-/// Largest unpacked size of a chunk, bytes. A recorder makes chunks of less than a megabyte plus one message.
+/// Maximum unpacked size of a chunk, bytes. Recorders make chunks of less than a megabyte plus one message.
 pub(super) const MOST_UNPACKED: usize = 64 << 20;
 
-/// An unpacked chunk.
+/// Result of unpacking a chunk.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Unpacked {
-    /// All of it.
+    /// The whole chunk.
     Whole(Vec<u8>),
-    /// The available part of a chunk that the end of the file cuts off.
+    /// The available part of a chunk that is cut off by the end of the file.
     Cut(Vec<u8>),
-    /// Nothing, with the reason.
+    /// The chunk can't be unpacked, for this reason.
     Bad(&'static str),
 }
 
-/// Unpacks a chunk with the stated compression and size. `cut` means that the file ends within it.
+/// Unpacks a chunk with the stated compression and size. `cut` means that the file ends within the chunk.
 ///
-/// Source: ROS wiki, "Bags/Format/2.0": none, bz2, and lz4 as roslz4 writes it, in frames of LZ4.
+/// Source: ROS wiki, "Bags/Format/2.0". Compressions are none, bz2, and lz4 as roslz4 writes it, in LZ4 frames.
 pub(super) fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unpacked {
     let Some(size) = usize::try_from(size).ok().filter(|size| *size <= MOST_UNPACKED) else {
         return Unpacked::Bad("chunks that would unpack to more than 64 MiB");
@@ -36,7 +36,7 @@ pub(super) fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unp
 
 fn read(reader: impl Read, size: usize, cut: bool) -> Unpacked {
     let mut unpacked = Vec::new();
-    // One byte more than stated shows that the chunk is longer.
+    // One byte more than the stated size is read, to notice a chunk that is too long.
     let result = reader.take(size as u64 + 1).read_to_end(&mut unpacked);
     judged(if result.is_ok() { Ok(unpacked) } else { Err(unpacked) }, size, cut)
 }
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stated_lengths_are_enforced() {
+    fn chunks_of_another_length_than_stated_are_refused() {
         assert_eq!(unpack(b"none", b"abc", 3, false), Unpacked::Whole(b"abc".to_vec()));
         assert!(matches!(unpack(b"none", b"abc", 4, false), Unpacked::Bad(_)));
         assert_eq!(unpack(b"none", b"abc", 4, true), Unpacked::Cut(b"abc".to_vec()));

@@ -1,21 +1,21 @@
-//! The two serialisations of ROS, parsed from untrusted bytes.
+//! Parses the two serialisations of ROS from untrusted bytes.
 //!
-//! Sources: ROS wiki, "Message serialization" (ROS 1: little-endian, packed); OMG DDS-XTypes 1.3, 7.4.3, plain CDR (ROS 2:
-//! numbers aligned to their size, counted after four bytes with the byte order).
+//! Sources: ROS wiki, "Message serialization", for ROS 1: little-endian and packed. OMG DDS-XTypes 1.3, 7.4.3, plain
+//! CDR, for ROS 2: numbers are aligned to their size, counted from the end of four bytes that state the byte order.
 
-/// Serialisation of messages.
+/// Serialisation of a recording's messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
-    /// ROS 1.
+    /// That of ROS 1.
     Ros1,
-    /// ROS 2: plain CDR of version 1.
+    /// That of ROS 2: plain CDR, version 1.
     Cdr,
 }
 
 /// Maximum number of padding bytes after a message's last field.
 const MOST_PADDING: usize = 7;
 
-/// The rest of a message.
+/// A message, and the position up to which it has been read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wire<'a> {
     bytes: &'a [u8],
@@ -27,7 +27,7 @@ pub(super) struct Wire<'a> {
 /// The header of a stamped message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header<'a> {
-    /// Timestamp, nanoseconds on the sender's clock, whatever its epoch.
+    /// Timestamp, nanoseconds on the sender's clock, which may have any epoch.
     pub(super) stamp_ns: u64,
     pub(super) frame_id: &'a [u8],
 }
@@ -42,7 +42,7 @@ macro_rules! numbers {
 }
 
 impl<'a> Wire<'a> {
-    /// Starts at a message's beginning; `None` if the encapsulation isn't plain CDR.
+    /// Starts at the beginning of a message. Returns `None` if its encapsulation isn't plain CDR.
     pub(super) fn new(message: &'a [u8], encoding: Encoding) -> Option<Self> {
         let (bytes, big_endian) = match (encoding, message) {
             (Encoding::Ros1, bytes) => (bytes, false),
@@ -54,7 +54,7 @@ impl<'a> Wire<'a> {
 
     numbers!(u8, u32, f32, f64);
 
-    /// Reads numbers of single precision as doubles.
+    /// Reads numbers of single precision, and returns them in double precision.
     pub(super) fn singles<const N: usize>(&mut self) -> Option<[f64; N]> {
         let mut all = [0.0; N];
         for one in &mut all {
@@ -71,7 +71,7 @@ impl<'a> Wire<'a> {
         Some(all)
     }
 
-    /// Reads the count before a sequence whose elements take at least `element_bytes`; `None` if they can't fit.
+    /// Reads the count of a sequence. Returns `None` if its elements, of at least `element_bytes` each, can't fit.
     pub(super) fn count(&mut self, element_bytes: usize) -> Option<usize> {
         let count = usize::try_from(self.u32()?).ok()?;
         let most = (self.bytes.len() - self.at) / element_bytes.max(1);
@@ -89,7 +89,7 @@ impl<'a> Wire<'a> {
         self.take(count)
     }
 
-    /// Reads a text's bytes, without CDR's terminating zero.
+    /// Reads the bytes of a text, without the terminating zero of CDR.
     pub(super) fn text(&mut self) -> Option<&'a [u8]> {
         let text = self.bytes()?;
         Some(match self.encoding {
@@ -107,7 +107,7 @@ impl<'a> Wire<'a> {
         Some(Header { stamp_ns, frame_id: self.text()? })
     }
 
-    /// Whether everything except padding has been read; ROS 1 has no padding.
+    /// Whether the whole message has been read, apart from padding. ROS 1 has no padding.
     pub(super) fn is_done(&self) -> bool {
         let left = self.bytes.len() - self.at;
         left == 0 || self.encoding == Encoding::Cdr && left <= MOST_PADDING
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cdr_alignment_counts_from_after_the_encapsulation() {
+    fn cdr_alignment_counts_from_the_end_of_the_encapsulation() {
         let bytes = [0, 1, 0, 0, 7, 0xAA, 0xAA, 0xAA, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xF0, 0x3F];
         let mut wire = Wire::new(&bytes, Encoding::Cdr).unwrap();
         assert_eq!((wire.u8(), wire.u32(), wire.f64()), (Some(7), Some(1), Some(1.0)));
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_counts_take_no_memory() {
+    fn impossible_counts_are_refused() {
         let bytes = [0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 3, 4];
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().single_sequence(), None);
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().text(), None);

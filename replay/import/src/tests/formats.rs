@@ -1,4 +1,4 @@
-//! The formats with constructed and arbitrary bytes.
+//! Tests of the formats with constructed and arbitrary bytes.
 
 use headrace_config::Document;
 use headrace_mavlink::MavHeader;
@@ -17,7 +17,7 @@ use crate::{Entry, Format, Step};
 const KINDS: [&dyn DeviceKind; 3] =
     [&headrace_bar100::Bar100Kind, &headrace_mavlink::MavlinkKind, &headrace_ping1d::Ping1dKind];
 
-/// Entries, bytes lost by reason, and bytes left at the end.
+/// Returns the entries, the losses with their reasons, and the number of bytes left at the end.
 fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {
     let (mut entries, mut lost) = (Vec::new(), Vec::new());
     while !file.is_empty() {
@@ -37,7 +37,7 @@ fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'s
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    // The last field isn't zero, so no trailing bytes are truncated and all 28 are sent.
+    // The last field isn't zero, so that the frame has all 28 bytes: MAVLink drops trailing zeros.
     let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
     frame.raw_bytes().to_vec()
@@ -120,7 +120,7 @@ fn imagenex_shots_get_the_times_of_their_headers() {
 }
 
 #[test]
-fn table_values_are_encoded_in_units_of_the_wire() {
+fn table_values_are_converted_to_wire_units() {
     let vehicle = "target_m = 1\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n\
         [[sensors]]\nid = \"d\"\nplugin = \"mavlink\"\npart = \"pressure\"\n";
     let mapping = "time_column = \"t\"\ntime_unit = \"ms\"\nseparator = \";\"\n[[columns]]\ncolumn = \"p\"\n\
@@ -132,16 +132,16 @@ fn table_values_are_encoded_in_units_of_the_wire() {
     let (entries, lost, left) = cut(&mut table, b"\"t\"; p\r\n20.5;-1.5005\r\n");
     assert_eq!((entries.len(), lost.len(), left), (1, 0, 0));
     assert_eq!((entries[0].stamp_ns, entries[0].stream.as_str()), (20_500_000, "d"));
-    // SCALED_PRESSURE2: time, then the absolute pressure in hPa, after a header of ten bytes.
+    // SCALED_PRESSURE2 has a header of ten bytes, then the time, then the absolute pressure in hPa.
     assert_eq!(entries[0].bytes[14..18], 1500.5_f32.to_le_bytes());
     let (entries, lost, left) = cut(&mut table, b"20.5;-1.5005\n20.6;-1");
-    assert_eq!((entries.len(), left), (1, 0), "half a number is withheld");
+    assert_eq!((entries.len(), left), (1, 0), "a row that may be cut short is not imported");
     assert!(matches!(lost[..], [(_, why)] if why.contains("without a line end")), "{lost:?}");
 }
 
 proptest! {
     #[test]
-    fn any_bytes_are_parsed_or_counted_as_lost(
+    fn any_bytes_are_split_into_entries_or_lost(
         bytes in proptest::collection::vec(any::<u8>(), 0..3000),
         which in 0_usize..3,
         at in 0_usize..400,
@@ -164,7 +164,7 @@ proptest! {
     }
 
     #[test]
-    fn any_table_is_parsed_or_counted_as_lost(
+    fn any_table_is_read_to_its_end(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..2000),
             "(-?[0-9e.]{0,22},[-0-9einaf.]{0,9},[0-9.]{0,3}\n?){0,40}".prop_map(String::into_bytes),

@@ -1,4 +1,4 @@
-//! The import with a test format, and candump on arbitrary bytes.
+//! Tests of the import with a test format, and of candump with arbitrary bytes.
 
 use std::io::Cursor;
 
@@ -11,8 +11,9 @@ use crate::candump::Candump;
 use crate::input::READ_BYTES;
 use crate::*;
 
-/// A test format with entries of eight bytes: u32 stamp in ms, 'E', stream, two bytes. An 'X' in the fifth place is
-/// bad.
+/// A test format with entries of eight bytes: u32 timestamp in ms, 'E', stream, two bytes.
+///
+/// An entry with 'X' in place of 'E' is invalid.
 struct Eights;
 
 impl Format for Eights {
@@ -43,7 +44,7 @@ fn taker(source: u16, stream: &str) -> Taker {
     Taker { source, stream: stream.to_owned(), driver: None }
 }
 
-/// The outcome, and the messages: source, ms after the beginning, last byte.
+/// Imports a file. Returns the result, and for each message its source, ms after the beginning and last byte.
 fn imported(file: &[u8]) -> (Imported, Vec<(u16, i64, u8)>) {
     let import = open(file, Box::new(Eights)).unwrap();
     let path = std::env::temp_dir().join(format!(
@@ -68,7 +69,7 @@ fn imported(file: &[u8]) -> (Imported, Vec<(u16, i64, u8)>) {
 }
 
 #[test]
-fn entries_are_put_in_order_and_losses_counted() {
+fn entries_are_sorted_by_time_and_losses_counted() {
     let file = [
         eight(5000, b'E', b'a', 1),
         eight(5020, b'E', b'b', 3),
@@ -96,7 +97,7 @@ fn entries_are_put_in_order_and_losses_counted() {
 }
 
 #[test]
-fn long_file_is_held_only_in_part() {
+fn long_file_is_read_with_bounded_memory() {
     let file: Vec<u8> = (0..400_000).flat_map(|n: u32| eight(n, b'E', b'a', n.to_le_bytes()[0])).collect();
     let import = open(&file, Box::new(Eights)).unwrap();
     assert!(import.input.held.len() <= 2 * READ_BYTES);
@@ -106,7 +107,7 @@ fn long_file_is_held_only_in_part() {
 }
 
 #[test]
-fn a_file_without_entries_is_named() {
+fn file_without_entries_is_refused() {
     for (file, words) in [(&b""[..], "in its 0 bytes"), (b"0000X...", "in its 8 bytes; bad: 1 times")] {
         let error = open(file, Box::new(Eights)).err().unwrap().to_string();
         assert!(error.contains("importing test: there is no entry") && error.contains(words), "{error}");
@@ -114,7 +115,7 @@ fn a_file_without_entries_is_named() {
 }
 
 #[test]
-fn candump_loses_only_the_bad_line() {
+fn invalid_candump_line_loses_only_itself() {
     let text = "(1.0) can0 123#11\nnonsense\n\n(1.1) can0 123#22\n(1.2) can0 123#33";
     let mut import = open(text.as_bytes(), Box::new(Candump)).unwrap();
     let mut count = 0;
@@ -130,7 +131,7 @@ fn candump_loses_only_the_bad_line() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_parsed_or_counted_as_lost(
+    fn any_bytes_are_read_as_candump_without_a_panic(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..2000),
             "(\\([0-9.]{0,12}\\) can[0-9] [0-9A-F]{0,9}#[0-9A-FR_.]{0,18}\n?){0,40}".prop_map(String::into_bytes),

@@ -1,4 +1,4 @@
-//! The import and the formats, each on constructed files.
+//! Tests of the import and of the formats, on constructed files.
 
 mod formats;
 mod machinery;

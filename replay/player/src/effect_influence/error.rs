@@ -1,9 +1,9 @@
-//! Errors of measuring effects.
+//! Errors of measuring the influence of effects.
 
 use crate::adviser::SimulationError;
 use crate::drive::DriveError;
 
-/// The effects of a scene can't be measured.
+/// Reason why the effects of a scene can't be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum EffectInfluenceError {
     /// A scene can't be simulated, possibly because an effect was left out.
@@ -15,7 +15,7 @@ pub enum EffectInfluenceError {
     /// The loop can't process a simulated dive.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// Too few seeds for a confidence interval.
+    /// There are too few seeds for a confidence interval.
     #[error("measuring worth: {0} seeds; an interval needs at least 2")]
     Seeds(usize),
 }

@@ -1,4 +1,4 @@
-//! Results of the loop for a simulated dive.
+//! Results of the loop for one simulated dive.
 
 use std::collections::BTreeMap;
 
@@ -12,14 +12,14 @@ use crate::adviser::simulation;
 use crate::drive::{Pace, drive};
 use crate::simulation_feed::SimulationFeed;
 
-/// Results of a dive.
+/// Results of one dive.
 #[derive(Debug, Clone)]
 pub(super) struct Figures {
-    /// D of each section, m, where it is bounded, by the section's start, mm.
+    /// D of each section whose hole is bounded, m, by the section's start, mm.
     holes_m: BTreeMap<i64, f64>,
     /// Length of the sections that the vehicle has passed, m.
     pub(super) way_m: f64,
-    /// Metres with the verdict pass.
+    /// Length of sections with the verdict "pass", m.
     pub(super) passed_m: f64,
 }
 
@@ -49,12 +49,12 @@ impl Figures {
         Ok(figures)
     }
 
-    /// Mean D, m.
+    /// Returns the mean of D over all sections, m.
     pub(super) fn hole_m(&self) -> f64 {
         self.holes_m.values().sum::<f64>() / self.holes_m.len() as f64
     }
 
-    /// Mean difference of D over the sections that both dives have, m; zero if they share none.
+    /// Returns the mean difference of D over the sections that both dives have, m; zero if there are none.
     pub(super) fn hole_more_than_m(&self, other: &Self) -> f64 {
         let both = self.holes_m.iter().filter_map(|(at, hole_m)| Some(hole_m - other.holes_m.get(at)?));
         let differences: Vec<f64> = both.collect();

@@ -1,4 +1,4 @@
-//! Measures the cost of simulating.
+//! Measures the computing cost of a simulation.
 
 use headrace_sensor::device::{Direction, Sense};
 use headrace_simulator::Scene;
@@ -8,10 +8,10 @@ use super::error::EffectInfluenceError;
 use super::mean::Mean;
 use crate::adviser::{SimulationError, simulation};
 
-/// Number of alternating rounds for the mean and its interval.
+/// Number of rounds, each with and without the effects.
 const ROUNDS: usize = 5;
 
-/// Cost of simulating with all effects, ns of processor time per sonar return.
+/// Returns the cost of simulating with all effects, ns of processor time per sonar return.
 ///
 /// Errors: see [`EffectInfluenceError`].
 pub(super) fn all_ns(scene: &Scene) -> Result<Mean, EffectInfluenceError> {
@@ -19,7 +19,7 @@ pub(super) fn all_ns(scene: &Scene) -> Result<Mean, EffectInfluenceError> {
     Ok(Mean::of(&rounds?))
 }
 
-/// Share of the cost due to these effects, ns of processor time per sonar return.
+/// Returns the cost that these effects add, ns of processor time per sonar return.
 ///
 /// Errors: see [`EffectInfluenceError`].
 pub(super) fn of_ns(scene: &mut Scene, effects: &[&str]) -> Result<Mean, EffectInfluenceError> {
@@ -34,7 +34,7 @@ pub(super) fn of_ns(scene: &mut Scene, effects: &[&str]) -> Result<Mean, EffectI
     Ok(Mean::of(&differences))
 }
 
-/// Processor time of this thread to simulate a scene, per sonar return, ns.
+/// Simulates a scene, and returns the processor time of this thread per sonar return, ns.
 fn ns_a_return(scene: &Scene) -> Result<f64, SimulationError> {
     let mut simulation = simulation(scene, false)?;
     let sensors = &scene.facts().sensors;
@@ -47,7 +47,7 @@ fn ns_a_return(scene: &Scene) -> Result<f64, SimulationError> {
     Ok((thread_ns() - began_ns) / returns.max(1) as f64)
 }
 
-/// Processor time used by this thread, ns.
+/// Returns the processor time used by this thread so far, ns.
 fn thread_ns() -> f64 {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e9 + time.tv_nsec as f64

@@ -1,4 +1,4 @@
-//! Messages that aren't synced yet: written since the last sync, or waiting until a medium is writable again.
+//! Messages that aren't synced yet. They were written since the last sync, or wait for a medium that can be written.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -8,10 +8,10 @@ use super::format::{RAW_PREFIX, SENT_PREFIX, TICK_TOPIC, Tick, VOICE_TOPIC};
 use super::part::Progress;
 use super::writer::{Lane, LogHeader};
 
-/// Maximum number of bytes kept, enough for minutes of four heads.
+/// Maximum memory of the messages, enough for minutes of four heads, bytes.
 const MAX_BYTES: usize = 16 << 20;
 
-/// A message without its bytes.
+/// Properties of a message, without its bytes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Head {
     pub(super) lane: Lane,
@@ -22,7 +22,7 @@ pub(super) struct Head {
     tick: Option<u64>,
 }
 
-/// Messages in their order, up to 16 MiB of them.
+/// Messages in the order of their arrival, at most 16 MiB.
 #[derive(Debug, Default)]
 pub(super) struct Backlog {
     heads: VecDeque<Head>,
@@ -36,12 +36,12 @@ impl Backlog {
         self.data.extend(bytes);
     }
 
-    /// Removes and returns the oldest message if the limit is exceeded.
+    /// Removes and returns the oldest message if the messages exceed the limit.
     pub(super) fn overflow(&mut self) -> Option<Head> {
         if self.bytes() > MAX_BYTES { self.pop() } else { None }
     }
 
-    /// Drops the recordings of voice notes and returns their heads.
+    /// Removes the recordings of voice notes, and returns their properties.
     pub(super) fn drop_voices(&mut self) -> Vec<Head> {
         let (mut dropped, mut at) = (Vec::new(), 0);
         let Self { heads, data } = self;
@@ -64,7 +64,7 @@ impl Backlog {
         Some(head)
     }
 
-    /// Memory that the messages take, bytes.
+    /// Returns the memory that the messages take, bytes.
     pub(super) fn bytes(&self) -> usize {
         self.data.len() + self.heads.len() * size_of::<Head>()
     }
@@ -73,7 +73,7 @@ impl Backlog {
         self.heads.len() as u64
     }
 
-    /// Log times of the first and last message.
+    /// Returns the log times of the first and last message.
     pub(super) fn span(&self) -> Option<(MonoNs, MonoNs)> {
         Some((self.heads.front()?.log_time, self.heads.back()?.log_time))
     }
@@ -95,7 +95,7 @@ impl Backlog {
     }
 }
 
-/// Totals of a recording's messages, over all parts.
+/// Totals of a recording's messages so far, over all parts.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
     messages: u64,
@@ -114,7 +114,7 @@ impl Tally {
         self.last = Some(head.log_time);
     }
 
-    /// The totals in the form in which a part states them.
+    /// Returns the totals as stated in a part.
     pub(super) fn progress(&self, header: &LogHeader) -> Progress {
         let source = |prefix: &str, number: u16| {
             header.sources.get(usize::from(number)).map(|source| format!("{prefix}{}", source.id))

@@ -1,4 +1,4 @@
-//! The channels of a log and the sources behind them.
+//! The channels of a log, and the sources that they belong to.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use super::framing::Definition;
 use super::limits::{HeaderBudget, MAX_CHANNELS, MAX_SOURCES};
 use super::{Many, SourceInfo};
 
-/// Rank of the first channel that isn't raw; source numbers are u16.
+/// Rank of the first channel that isn't raw. Source numbers are u16, so raw channels rank lower.
 const OTHER_RANK: u32 = 1 << 16;
 
 /// Content of a channel.
@@ -28,37 +28,40 @@ pub(super) enum ChannelKind {
 pub(super) struct Channel {
     pub(super) definition: Definition,
     pub(super) kind: ChannelKind,
-    /// Sort rank among messages of the same time: raw messages by source, then the others by topic.
+    /// Sort rank among messages with equal times. Raw channels are ordered by source, then other channels by topic.
     pub(super) rank: u32,
 }
 
 /// Result of adding a channel's definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Admission {
-    /// Added, or known already.
+    /// The channel was added, or was known before.
     Known,
-    /// It contradicts a known channel.
+    /// The definition contradicts a known channel.
     Conflict,
-    /// Exceeds a limit.
+    /// The channel would exceed a limit.
     Beyond(Many),
 }
 
-/// All known channels.
+/// All channels known so far.
 #[derive(Debug, Default)]
 pub(super) struct Channels {
     by_id: BTreeMap<u16, Channel>,
     sources: Vec<SourceInfo>,
     others: u32,
-    /// Memory of the definitions.
+    /// Memory used by the definitions.
     budget: HeaderBudget,
-    /// The limit that the log's own channel list exceeded, if any.
+    /// Limit that the initial definitions exceeded, if any.
     refused: Option<Many>,
-    /// Definitions found while messages are read, in order of appearance.
+    /// Definitions found among the messages, in order of appearance.
     later: Vec<Definition>,
 }
 
 impl Channels {
-    /// Numbers the sources: by their channels' metadata if it numbers all of them from 0, otherwise by name.
+    /// Creates the channels, and numbers their sources.
+    ///
+    /// The numbers come from the channels' metadata if these number all sources from 0, and otherwise from the order
+    /// of names.
     pub(super) fn new(definitions: BTreeMap<u16, Definition>, budget: HeaderBudget) -> Self {
         let mut definitions: Vec<Definition> = definitions.into_values().collect();
         let numbers: BTreeMap<&str, Option<u16>> =
@@ -67,7 +70,8 @@ impl Channels {
         let stated = distinct.iter().copied().map(usize::from).eq(0..numbers.len());
         definitions.sort_by_cached_key(|d| (stated.then(|| stated_number(d)), d.topic.clone(), d.id));
         let mut channels = Self { budget, ..Self::default() };
-        // Raw channels first, so that sources with only sent bytes come after those that sent something themselves.
+        // Raw channels come first, so that sources that only received bytes get higher numbers than sources that sent
+        // some.
         let (raw, others): (Vec<_>, Vec<_>) =
             definitions.into_iter().partition(|d| stated || d.topic.starts_with(RAW_PREFIX));
         for definition in raw.into_iter().chain(others) {
@@ -78,12 +82,12 @@ impl Channels {
         channels
     }
 
-    /// The limit that the initial definitions exceeded, if any.
+    /// Returns the limit that the initial definitions exceeded, if any.
     pub(super) fn refused(&self) -> Option<Many> {
         self.refused
     }
 
-    /// Adds a channel that is defined among the messages. A new source gets the next number.
+    /// Adds a channel whose definition was found among the messages. A new source gets the next number.
     pub(super) fn admit(&mut self, definition: Definition) -> Admission {
         if let Some(known) = self.by_id.get(&definition.id) {
             return if known.definition == definition { Admission::Known } else { Admission::Conflict };
@@ -98,12 +102,12 @@ impl Channels {
         admission
     }
 
-    /// Definitions found among the messages so far.
+    /// Returns the definitions found among the messages so far.
     pub(super) fn later(&self) -> &[Definition] {
         &self.later
     }
 
-    /// Sets the channels to those known at a place where `later` have been found among the messages.
+    /// Restores the channels of an earlier position, at which `later` had been found among the messages.
     pub(super) fn go_to(&mut self, later: &[Definition]) {
         let same = self.later.iter().zip(later).take_while(|(one, other)| one.id == other.id).count();
         for gone in self.later.drain(same..).rev() {
@@ -178,7 +182,7 @@ impl Channels {
         results.map(|channel| channel.definition.topic.clone()).collect()
     }
 
-    /// Topics with several channels, with the channel numbers.
+    /// Returns the topics that have several channels, each with its channel numbers.
     pub(super) fn doubles(&self) -> Vec<(String, Vec<u16>)> {
         let mut topics: BTreeMap<&str, Vec<u16>> = BTreeMap::new();
         for (id, channel) in &self.by_id {
@@ -195,7 +199,7 @@ impl Channels {
             self.sources.push(SourceInfo { id, plugin: text(PLUGIN_KEY), connect: text(CONNECT_KEY) });
             self.sources.len() - 1
         });
-        // At most MAX_SOURCES.
+        // The index is below MAX_SOURCES, which fits.
         u16::try_from(number).unwrap_or(u16::MAX)
     }
 }
@@ -208,7 +212,7 @@ fn stated_number(definition: &Definition) -> Option<u16> {
     definition.metadata.get(SOURCE_KEY)?.parse().ok()
 }
 
-/// The channels in the metadata record that repeats them.
+/// Returns the channels from the metadata record that lists them.
 pub(super) fn listed(entries: &BTreeMap<String, String>) -> Vec<Definition> {
     let mut definitions: BTreeMap<u16, Definition> = BTreeMap::new();
     for (key, value) in entries {
@@ -257,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn sources_are_numbered_by_metadata_if_it_numbers_all() {
+    fn sources_are_numbered_by_metadata_that_number_all() {
         let stated =
             [("/raw/a", Some("1")), ("/raw/b", Some("0")), ("/sent/a", Some("1")), ("/loop/tick", None)];
         assert_eq!(ids(&channels(&stated)), ["b", "a"]);
@@ -266,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_definition_must_agree() {
+    fn contradicting_second_definition_of_a_channel_is_refused() {
         let mut channels = channels(&[("/raw/a", None)]);
         let same = channels.get(0).unwrap().definition.clone();
         assert_eq!(channels.admit(same.clone()), Admission::Known);
@@ -274,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_defined_after_a_position_are_forgotten_when_going_back() {
+    fn channels_defined_after_a_position_are_forgotten_on_going_back() {
         let mut channels = channels(&[("/raw/a", None)]);
         let first = channels.get(0).unwrap().definition.clone();
         for (id, topic) in [(7, "/raw/b"), (5, "/imu"), (9, "/sent/c")] {
@@ -292,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_and_sources_have_limits() {
+    fn excess_channels_and_sources_are_refused() {
         let topics: Vec<String> = (0..MAX_SOURCES + 2).map(|n| format!("/raw/{n}")).collect();
         let all: Vec<_> = topics.iter().map(|topic| (topic.as_str(), None)).collect();
         let found = channels(&all);

@@ -1,4 +1,4 @@
-//! Unpacks chunks and checks the checksums over larger parts of a file, with the `mcap` crate's reader.
+//! Unpacks chunks, and verifies the checksums of larger parts of a file, with the `mcap` crate's reader.
 
 use std::io::{Read, Seek};
 
@@ -14,20 +14,20 @@ use super::{LogError, LossKind};
 /// Read size, bytes.
 const READ_BYTES: usize = 1 << 20;
 
-/// Outcome of unpacking a chunk.
+/// Result of unpacking a chunk.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Unpacked {
-    /// All of it is valid.
+    /// The whole chunk is valid.
     Whole,
-    /// The file ends within it; the records before the end parse, but no checksum covers them.
+    /// The file ends within the chunk. The records before the end parse, but no checksum covers them.
     Cut,
-    /// Damaged; none of its records can be trusted.
+    /// The chunk is damaged, and none of its records can be trusted.
     Bad(LossKind),
 }
 
-/// Calls `sink` with opcode and body of each record in a chunk.
+/// Calls `sink` with the opcode and body of each record in a chunk.
 ///
-/// Errors: I/O only.
+/// Errors: I/O errors only. Damage is part of the result.
 pub(super) fn unpack<R: Read + Seek>(
     file: &mut LogFile<R>,
     place: &ChunkPlace,
@@ -38,10 +38,11 @@ pub(super) fn unpack<R: Read + Seek>(
     }
     let mut reader = reader(|options| options.with_skip_start_magic(true).with_validate_chunk_crcs(true));
     if let Err(error) = reader.add_decompressor(Unzstd::default()) {
-        // Not reached, since the compression has a name.
+        // This can't happen, because the decompressor has a name.
         tracing::error!(%error, "chunks packed by zstd can't be read");
     }
-    // The header is rebuilt: in a chunk cut by the end of the file, its lengths and checksum cover data that isn't there.
+    // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum would then
+    // cover data that is missing.
     let head = chunk_head(place);
     reader.insert(head.len()).copy_from_slice(&head);
     reader.notify_read(head.len());
@@ -64,7 +65,8 @@ pub(super) fn unpack<R: Read + Seek>(
             Unpacked::Bad(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES })
         }
         Err(McapError::UnsupportedCompression(name)) => Unpacked::Bad(LossKind::Compression(name)),
-        // Without a checksum nothing covers the content: a header of zeros turns any bytes into an empty chunk.
+        // Without a checksum nothing protects the content: a header of zeros would turn any bytes into an empty
+        // chunk.
         _ if place.doubtful && place.crc == 0 => Unpacked::Bad(LossKind::Contents),
         _ if place.cut => Unpacked::Cut,
         Ok(()) => Unpacked::Whole,
@@ -73,7 +75,7 @@ pub(super) fn unpack<R: Read + Seek>(
     })
 }
 
-/// Whether the checksum over everything before the data end record matches.
+/// Whether the checksum matches that covers everything before the data end record.
 ///
 /// Also true if there is no checksum, or a record is too large to read.
 pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Result<bool, LogError> {
@@ -82,21 +84,22 @@ pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Resul
     Ok(!matches!(result, Err(McapError::BadDataCrc { .. })))
 }
 
-/// Whether the summary, which begins with the data end record at `data_end`, parses and its checksum, if any, matches.
+/// Whether the summary parses and matches its checksum, if it has one. It begins after the data end record at
+/// `data_end`.
 pub(super) fn summary_holds<R: Read + Seek>(file: &mut LogFile<R>, data_end: u64) -> Result<bool, LogError> {
     let reader =
         reader(|options| options.with_skip_start_magic(true).with_validate_summary_section_crc(true));
     Ok(drive(file, data_end..u64::MAX, reader, &mut |opcode, _| opcode != op::FOOTER)?.is_ok())
 }
 
-/// Creates a reader that allocates no more than the longest record needs, whatever lengths a file claims.
+/// Creates a reader that never allocates more than the longest allowed record, whatever lengths a file claims.
 fn reader(set: impl FnOnce(LinearReaderOptions) -> LinearReaderOptions) -> LinearReader {
     let limit = usize::try_from(MAX_UNPACKED_BYTES).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(limit);
     LinearReader::new_with_options(set(options))
 }
 
-/// Feeds a range of the file to a reader until the range ends, the reader fails, or `sink` returns false.
+/// Passes a range of the file to a reader, until the range ends, the reader fails, or `sink` returns false.
 fn drive<R: Read + Seek>(
     file: &mut LogFile<R>,
     part: core::ops::Range<u64>,
@@ -120,7 +123,7 @@ fn drive<R: Read + Seek>(
     Ok(Ok(()))
 }
 
-/// A chunk record's bytes before its data.
+/// Returns the bytes of a chunk record before its data.
 ///
 /// Source: MCAP format specification, "Chunk (op=0x06)".
 fn chunk_head(place: &ChunkPlace) -> Vec<u8> {

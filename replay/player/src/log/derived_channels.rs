@@ -5,19 +5,19 @@ use headrace_geometry::time::MonoNs;
 /// A derived message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
-    /// Number of its result channel; ignored if the log has no such channel.
+    /// Number of the result channel for the message. The message is ignored if the log has no such channel.
     pub channel: u16,
-    /// Log time.
+    /// Log time of the message.
     pub at: MonoNs,
-    /// Content.
+    /// Content of the message.
     pub bytes: Vec<u8>,
 }
 
-/// Derives messages from results as they pass through the recorder, without involving the loop.
+/// Derives messages from results on the recorder's thread, so that the loop has no extra work.
 pub trait DerivedChannels: Send {
-    /// Takes a message of result channel `channel`; called whether or not the disk has room for the message.
+    /// Processes a message of result channel `channel`. It is called even if the disk has no room for that message.
     fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>);
 
-    /// Called when the dive has ended.
+    /// Called at the end of the dive.
     fn end(&mut self, made: &mut Vec<Made>);
 }

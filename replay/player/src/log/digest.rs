@@ -1,4 +1,4 @@
-//! Digests of log files.
+//! Computes digests of log files.
 
 use std::io::Read;
 use std::path::Path;
@@ -9,14 +9,14 @@ use super::LogError;
 use super::format::hex;
 use crate::regular_file;
 
-/// SHA-256 of a file, in hex.
+/// Returns the SHA-256 of a file, in hex.
 ///
 /// Errors: the file can't be read.
 pub fn file_digest(path: &Path) -> Result<String, LogError> {
     files_digest(&[path])
 }
 
-/// SHA-256 of the concatenated files, in hex.
+/// Returns the SHA-256 of the concatenated files, in hex.
 ///
 /// Errors: a file can't be read.
 pub fn files_digest(paths: &[impl AsRef<Path>]) -> Result<String, LogError> {

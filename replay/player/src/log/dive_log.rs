@@ -1,8 +1,8 @@
-//! A dive's log: one file, or the parts of a recording read as one.
+//! A dive's log: one file, or the parts of a recording read as one log.
 //!
-//! Parts are ordered by the part number they contain, not by file name. Each part is scanned once on opening; then the
-//! parts are read one after the other. The running totals in each part's header show whether a part is missing or has
-//! been exchanged.
+//! Parts are ordered by the part numbers that they contain, not by file names. Opening scans each part once;
+//! afterwards the parts are read in order. The totals in the header of each part show whether a part is missing or
+//! was replaced.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -18,24 +18,24 @@ use super::{LogError, LogInfo, LogMessage, LogPlace, LogReader, Loss, LossKind, 
 /// A file of a dive's log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartFile {
-    /// Its path.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Source messages read from it so far.
+    /// Number of source messages read from the file so far.
     pub messages: u64,
     /// Part number, if the recording has parts.
     number: Option<u32>,
 }
 
-/// Opens the log with a given index in the list.
+/// Opens the file with this index in the list of files.
 type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError> + Send>;
 
 /// A position in a dive's log, to continue reading from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DivePlace {
-    /// The file.
+    /// Index of the file.
     at: usize,
     place: LogPlace,
-    /// Source messages read from each file.
+    /// Number of source messages read from each file.
     messages: Vec<u64>,
     earlier: Vec<Loss>,
     late: u64,
@@ -60,18 +60,18 @@ pub struct DiveLog<R = File> {
     earlier: Vec<Loss>,
     late: u64,
     times: Option<(MonoNs, MonoNs)>,
-    /// For each file that was cut off, its continuation in the next file.
+    /// For each file that was cut off, the continuation in the next file.
     resumed: Vec<Option<Resumed>>,
-    /// Messages delivered from the file being read.
+    /// Number of messages delivered from the file being read.
     delivered: u64,
 }
 
-/// Continuation of a recording in the next part after a part was cut off.
+/// Continuation of a recording in the next part, after a part was cut off.
 #[derive(Debug, Clone)]
 struct Resumed {
-    /// Totals before the next part, which repeats everything after them.
+    /// Totals up to the next part, which repeats all later messages.
     before: Progress,
-    /// Messages of the cut-off part that the next part doesn't repeat.
+    /// Number of messages in the cut-off part that the next part doesn't repeat.
     messages: u64,
     /// First log time of the next part.
     at: Option<MonoNs>,
@@ -80,7 +80,7 @@ struct Resumed {
 impl DiveLog<File> {
     /// Opens a log, or the parts of a recording; see [`super::files_of`].
     ///
-    /// Errors: a file can't be read, isn't MCAP, or has a later format; or several files aren't parts of one recording.
+    /// Errors: a file can't be read, isn't MCAP, or has a later format; several files aren't parts of one recording.
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
         let log = match files {
             [file] => Self::single(LogReader::open(file)?, file),
@@ -122,10 +122,10 @@ impl DiveLog<File> {
 }
 
 impl<R: Read + Seek> DiveLog<R> {
-    /// Creates the log from a single reader.
+    /// Creates a dive log from a single reader.
     pub fn of(reader: LogReader<R>) -> Self {
         let file = PartFile { path: PathBuf::new(), messages: 0, number: None };
-        // Never called, since no file follows.
+        // A single log has no further file, so this is never called.
         let open = |_| Err(LogError::NoLogs { folder: PathBuf::new() });
         Self::start(Box::new(open), reader, vec![file], Vec::new())
     }
@@ -157,12 +157,12 @@ impl<R: Read + Seek> DiveLog<R> {
         log
     }
 
-    /// The log's header; with several parts, that of the first.
+    /// Returns the log's header. If there are several parts, it is the first part's header.
     pub fn header(&self) -> &LogInfo {
         &self.info
     }
 
-    /// Topics of results read so far.
+    /// Returns the topics of results read so far.
     pub(crate) fn result_topics(&self) -> Vec<String> {
         self.channels_found().0
     }
@@ -177,7 +177,7 @@ impl<R: Read + Seek> DiveLog<R> {
         self.reader.has_voices()
     }
 
-    /// Skips messages earlier than `at`, by the chunk headers; call before reading the first message.
+    /// Skips messages earlier than `at`, judged by the chunk headers. Call it before reading the first message.
     ///
     /// Errors: a further file can't be opened.
     pub(super) fn pass_before(&mut self, at: MonoNs) -> Result<(), LogError> {
@@ -188,23 +188,25 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(())
     }
 
-    /// The files, in reading order.
+    /// Returns the files, in reading order.
     pub fn files(&self) -> &[PartFile] {
         &self.files
     }
 
-    /// Damage and gaps found so far; complete when [`DiveLog::next`] has returned `None`.
+    /// Returns damage and gaps found so far. The list is complete when [`DiveLog::next`] has returned `None`.
     pub fn losses(&self) -> Vec<Loss> {
         let present = self.reader.losses().iter().filter_map(|loss| self.in_part(loss));
         self.between.iter().chain(&self.earlier).cloned().chain(present).collect()
     }
 
-    /// First and last log time, from the chunk headers.
+    /// Returns the first and last log time, from the chunk headers.
     pub fn times(&self) -> Option<(MonoNs, MonoNs)> {
         self.times
     }
 
-    /// Topics with several channels in the file being read, with the channel numbers. They share one source.
+    /// Returns the topics with several channels in the file being read, each with its channel numbers.
+    ///
+    /// Channels of the same topic share one source.
     pub fn doubles(&self) -> Vec<(String, Vec<u16>)> {
         self.reader.doubles()
     }
@@ -214,12 +216,12 @@ impl<R: Read + Seek> DiveLog<R> {
         !(self.between.is_empty() && self.earlier.is_empty() && self.reader.losses().is_empty())
     }
 
-    /// Messages delivered after one with a later log time, in a log without ticks.
+    /// Returns how many messages were delivered after a message with a later log time, in a log without ticks.
     pub fn late(&self) -> u64 {
         self.late + self.reader.late()
     }
 
-    /// Result topics and sources of all channels read so far.
+    /// Returns the result topics and the sources of all channels read so far.
     pub(super) fn channels_found(&self) -> (Vec<String>, Vec<SourceInfo>) {
         let mut topics = self.topics.clone();
         topics.extend(self.reader.result_topics().into_iter().filter(|topic| !self.topics.contains(topic)));
@@ -229,14 +231,14 @@ impl<R: Read + Seek> DiveLog<R> {
         (topics, all)
     }
 
-    /// Name of a source, by its number in messages; those of the channels read so far are known.
+    /// Returns the name of a source, by its number in messages. Only sources of channels read so far are known.
     pub fn source_id(&self, source: u16) -> Option<&str> {
         self.info.sources.get(usize::from(source)).map(|source| source.id.as_str())
     }
 
-    /// The next message, or `None` at the end.
+    /// Returns the next message; `None` at the end.
     ///
-    /// Errors: an I/O error; damage is not an error.
+    /// Errors: an I/O error. Damage is not an error.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -269,7 +271,7 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(Some(message))
     }
 
-    /// The current position.
+    /// Returns the current position.
     pub fn place(&self) -> DivePlace {
         DivePlace {
             at: self.at,
@@ -281,7 +283,7 @@ impl<R: Read + Seek> DiveLog<R> {
         }
     }
 
-    /// Continues from a position of this or another reader of the same files, see [`LogReader::go_to`].
+    /// Continues from a position of this reader, or of another reader of the same files; see [`LogReader::go_to`].
     ///
     /// Errors: an I/O error.
     pub fn go_to(&mut self, place: &DivePlace) -> Result<(), LogError> {
@@ -295,7 +297,7 @@ impl<R: Read + Seek> DiveLog<R> {
         }
         (self.earlier, self.late, self.delivered) = (place.earlier.clone(), place.late, place.delivered);
         self.reader.go_to(&place.place)?;
-        // Numbers the sources of the channels known at the place.
+        // The sources at this position depend on the channels known there.
         self.number_sources();
         Ok(())
     }
@@ -314,14 +316,14 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(())
     }
 
-    /// Excludes messages of this file that the next one repeats.
+    /// Excludes messages of this file that the next file repeats.
     fn pass_over(&mut self) {
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
             self.reader.pass_over(&resumed.before);
         }
     }
 
-    /// Maps the file's sources to the dive's by name; adds new ones up to the limit over all files.
+    /// Maps the file's sources to the dive's sources by name. Adds new sources, up to the limit for all files.
     fn number_sources(&mut self) {
         self.numbers.clear();
         for source in self.reader.sources() {
@@ -334,11 +336,11 @@ impl<R: Read + Seek> DiveLog<R> {
         }
     }
 
-    /// Converts a loss of the file being read to one of the dive; `None` if the next part has the lost messages.
+    /// Converts a loss of the file being read to a loss of the dive; `None` if the next part has the lost messages.
     fn in_part(&self, loss: &Loss) -> Option<Loss> {
         let mut loss = loss.clone();
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
-            // The next part states why this one was cut off.
+            // The next part states this loss.
             if loss.kind == LossKind::Truncated && self.delivered == resumed.messages {
                 return None;
             }
@@ -352,7 +354,7 @@ impl<R: Read + Seek> DiveLog<R> {
     }
 }
 
-/// A part's header and totals, from its first scan.
+/// Part number, part metadata and times of a file, from its first scan.
 #[derive(Debug, Clone)]
 struct Glance {
     number: u32,
@@ -366,13 +368,13 @@ impl Glance {
     }
 }
 
-/// Parts in order, with the losses of damaged ones.
+/// Parts in order, and the losses of unreadable parts.
 struct Arranged {
     parts: Vec<(PathBuf, Glance)>,
     losses: Vec<Loss>,
 }
 
-/// Scans each file and sorts the files by part number.
+/// Scans each file, and sorts the files by part number.
 fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
     let (mut parts, mut losses): (Vec<(PathBuf, Glance)>, _) = (Vec::new(), Vec::new());
     let mut unread = None;
@@ -387,7 +389,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
                 }
                 _ => return Err(LogError::NotAPart { path: path.clone() }),
             },
-            // The file was created just before the power failed.
+            // An empty file that was created just before a power cut.
             (Err(LogError::NotMcap { name, found, wanted }), Some(part)) => {
                 losses.push(loss(LossKind::PartUnreadable { part, found: found.clone() }, None, None));
                 unread = Some(LogError::NotMcap { name, found, wanted });
@@ -403,7 +405,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
     }
 }
 
-/// Checks that all parts belong to one recording and that none occurs twice.
+/// Checks that all parts belong to one recording, and that no part occurs twice.
 fn agree(parts: &[(PathBuf, Glance)]) -> Result<(), LogError> {
     let dive = |glance: &Glance| glance.part.as_ref().map(|part| part.head.dive.clone());
     let mut named = parts.iter().filter_map(|(path, glance)| Some((path, dive(glance)?)));
@@ -422,7 +424,7 @@ fn agree(parts: &[(PathBuf, Glance)]) -> Result<(), LogError> {
     Ok(())
 }
 
-/// Losses before, between and after parts.
+/// Returns losses before, between and after the parts.
 fn between(parts: &[Glance]) -> Vec<Loss> {
     let mut losses = Vec::new();
     let from = |glance: &Glance| glance.times.map(|times| times.1);
@@ -448,7 +450,7 @@ fn between(parts: &[Glance]) -> Vec<Loss> {
     losses
 }
 
-/// For each part that was cut off, finds its continuation in the next part.
+/// Returns the continuation of each part that was cut off.
 fn resumed(parts: &[Glance]) -> Vec<Option<Resumed>> {
     let pair = |pair: &[Glance]| {
         let [one, next] = pair else { return None };

@@ -1,31 +1,31 @@
-//! Faults of a recording while it is made.
+//! Faults of a recording while it is being made.
 
 use std::path::PathBuf;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Maximum number of faults that are listed; later ones extend the last entry.
+/// Maximum number of faults in the list. Later faults extend the last entry.
 const MAX_FAULTS: usize = 100;
 
-/// A part of a recording that could no longer be written.
+/// A fault after which a part of a recording could no longer be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordingFault {
-    /// The part.
+    /// Path of the part.
     pub path: PathBuf,
-    /// Attempted operation, and the system's error.
+    /// The failed action, and the error of the system.
     pub error: String,
-    /// Messages that no part contains.
+    /// Number of messages that no part contains.
     pub lost: u64,
     /// Log time of the last synced message before the fault, if any.
     pub from: Option<MonoNs>,
     /// Log time of the first message after the fault, if any.
     pub to: Option<MonoNs>,
-    /// The part in which the recording continues; `None` if the recording ended.
+    /// The part in which the recording continues; `None` if the recording has ended.
     pub continued: Option<PathBuf>,
 }
 
 impl RecordingFault {
-    /// As text, without the times.
+    /// Returns the fault as text, without the times.
     pub fn words(&self) -> String {
         let Self { path, error, lost, continued, .. } = self;
         let lost = match lost {
@@ -46,46 +46,47 @@ impl RecordingFault {
     }
 }
 
-/// A change in the state of a recording, reported to those who watch the dive.
+/// A change in the state of a recording, for display to people who watch the dive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RecordingEvent {
-    /// A part can't be written any more. Nothing is recorded until a new part can be begun, which is retried.
+    /// A part can't be written any more. Nothing is recorded until another part has been begun, which is tried
+    /// repeatedly.
     Failed {
-        /// The part.
+        /// Path of the part.
         path: PathBuf,
-        /// Attempted operation, and the system's error.
+        /// The failed action, and the error of the system.
         error: String,
     },
     /// The recording continues.
     Resumed(RecordingFault),
-    /// The medium accepts nothing without an error, and the queue is full: new data isn't recorded.
+    /// The medium doesn't accept data, without an error. The queue is full, so new data isn't recorded.
     Behind,
-    /// The medium takes data again.
+    /// The medium accepts data again.
     CaughtUp {
-        /// Packets that weren't recorded.
+        /// Number of packets that were not recorded.
         packets: u64,
     },
-    /// The medium is slow: a power cut would lose the last seconds.
+    /// The medium is slow. A power cut would lose the last seconds.
     Late {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
         /// Dive time that isn't on the medium yet.
         by: DurNs,
     },
     /// The medium is no longer slow.
     InTime {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
     },
 }
 
 impl RecordingEvent {
-    /// Whether new data is lost, or would be lost in a power cut.
+    /// Whether new data is being lost, or would be lost in a power cut.
     pub fn fails(&self) -> bool {
         matches!(self, Self::Failed { .. } | Self::Behind | Self::Late { .. })
     }
 
-    /// As text.
+    /// Returns the event as text.
     pub fn words(&self) -> String {
         match self {
             Self::Failed { path, error } => {

@@ -1,4 +1,4 @@
-//! Fields of MCAP records, parsed from untrusted bytes.
+//! Reads fields of MCAP records from untrusted bytes.
 //!
 //! Source: MCAP format specification, "Serialization": integers are little-endian; strings and maps have a length
 //! prefix in bytes.
@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use super::limits::{MAX_HEADER_BYTES, map_cost};
 
-/// The rest of a record, and the number of bytes taken.
+/// The unread rest of a record, and the number of bytes read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fields<'a> {
     rest: &'a [u8],
@@ -19,17 +19,17 @@ impl<'a> Fields<'a> {
         Self { rest: bytes, taken: 0 }
     }
 
-    /// Bytes taken so far.
+    /// Returns the number of bytes read so far.
     pub(super) fn taken(&self) -> u64 {
         self.taken
     }
 
-    /// The remaining bytes.
+    /// Returns the unread bytes.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.rest
     }
 
-    /// The next `len` bytes; `None` when there are fewer.
+    /// Reads the next `len` bytes; `None` if there are fewer.
     pub(super) fn take(&mut self, len: u64) -> Option<&'a [u8]> {
         let (head, rest) = self.rest.split_at_checked(usize::try_from(len).ok()?)?;
         self.rest = rest;
@@ -58,7 +58,7 @@ impl<'a> Fields<'a> {
         str::from_utf8(self.take(len.into())?).ok()
     }
 
-    /// A map; `None` also if it would take more memory than a log's header may.
+    /// Reads a map; `None` if it is invalid, or would take more memory than a log's header may take.
     pub(super) fn map(&mut self) -> Option<BTreeMap<String, String>> {
         if self.map_cost()? > MAX_HEADER_BYTES {
             return None;
@@ -72,7 +72,8 @@ impl<'a> Fields<'a> {
         Some(map)
     }
 
-    /// Memory that the map at the current position would take, see [`map_cost`]; doesn't advance.
+    /// Returns the memory that the map at the current position would take, see [`map_cost`]. The position doesn't
+    /// change.
     pub(super) fn map_cost(&self) -> Option<u64> {
         let mut all = *self;
         let len = all.u32()?;
@@ -86,7 +87,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// The fixed part of a message record.
+/// Fields of a message record before its data.
 ///
 /// Source: MCAP format specification, "Message (op=0x05)".
 #[derive(Debug, Clone, Copy)]
@@ -113,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wrong_length_gives_none() {
+    fn fields_beyond_the_record_are_none() {
         assert_eq!(Fields::new(&[5, 0, 0, 0, b'a']).text(), None);
         assert_eq!(Fields::new(&[0xFF; 12]).map(), None);
         assert_eq!(Fields::new(&[1, 0, 0, 0, 0xFF]).text(), None);
@@ -122,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn written_map_is_read_back() {
+    fn encoded_map_is_decoded() {
         let bytes = b"\x0c\0\0\0\x01\0\0\0a\x03\0\0\0bcd rest";
         let mut fields = Fields::new(bytes);
         assert_eq!(fields.map(), Some(BTreeMap::from([("a".to_owned(), "bcd".to_owned())])));

@@ -5,9 +5,9 @@
 //! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, if the device gives one, else the receive time |
 //! | `/sent/<source id>` | bytes sent to the device | time of sending | the same |
 //! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's time | the same |
-//! | `/notes/voice` | the recording of a voice note, see [`super::voice`]; read by people, never by a replay | that of the previous message | the same |
-//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice`, `/result/states` | the loop's results of a tick as words ([`headrace_monitor::result_stream`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's time | the same |
-//! | `/result/view/...` | the same for viewers, in JSON: [`crate::view`] | the tick's time | the same |
+//! | `/notes/voice` | the recording of a voice note, see [`super::voice`]. A replay doesn't read it | log time of the previous message | the same |
+//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice`, `/result/states` | the loop's results of a tick as words ([`headrace_monitor::result_stream`]): u64 tick, u64 number of the first record, then the records. Only `verify` reads them, a replay doesn't | the tick's time | the same |
+//! | `/result/view/...` | results for viewers, in JSON: [`crate::view`] | the tick's time | the same |
 //!
 //! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).
 //!
@@ -19,13 +19,13 @@ use std::collections::BTreeMap;
 use headrace_geometry::time::MonoNs;
 use sha2::{Digest, Sha256};
 
-/// Version of the format described by this module.
+/// Version of the log format that this module describes.
 pub const FORMAT_VERSION: u32 = 1;
-/// Prefix of the `library` field of this program's logs; the program's version follows.
+/// Prefix of the `library` field in this program's logs. The program's version follows it.
 pub const LIBRARY: &str = "headrace ";
-/// Prefix of a source's id: bytes received.
+/// Topic prefix for bytes received from a source; its id follows.
 pub const RAW_PREFIX: &str = "/raw/";
-/// Prefix of a source's id: bytes sent.
+/// Topic prefix for bytes sent to a source; its id follows.
 pub const SENT_PREFIX: &str = "/sent/";
 /// Topic prefix of results.
 pub const RESULT_PREFIX: &str = "/result/";
@@ -39,60 +39,64 @@ pub const TICK_TOPIC: &str = "/loop/tick";
 pub const BYTES_ENCODING: &str = "application/octet-stream";
 /// Name of the metadata record written by the recorder: versions, digests, clock anchors.
 pub const METADATA: &str = "headrace";
-/// Name of the metadata record that repeats the channels: `<number>/topic`, `<number>/<key of its metadata>`; and the
-/// attachments: [`ATTACHMENT_PREFIX`] and name, with the length in bytes as the value.
+/// Name of the metadata record that repeats the channel definitions and lists the attachments.
+///
+/// For each channel it has the keys `<number>/topic` and `<number>/<key of its metadata>`. For each attachment the
+/// key is [`ATTACHMENT_PREFIX`] and its name, and the value is its length in bytes.
 pub const CHANNEL_LIST: &str = "headrace.channels";
-/// Name of the metadata records of the log's known losses: `<number>` to `<from> <to> <words>`, log times in ns, `-` where
-/// there is none. Written by a recorder on a full disk and by `headrace recover`.
+/// Name of the metadata records that state known losses of the log.
+///
+/// The key is `<number>`, the value is `<from> <to> <words>`, with log times in ns, or `-` without a time. A recorder
+/// writes them when the disk is full or after a fault, and `headrace recover` writes them too.
 pub const LOSSES: &str = "headrace.losses";
 /// Prefix of attachment names in [`CHANNEL_LIST`].
 pub const ATTACHMENT_PREFIX: &str = "attachment/";
-/// Key in [`METADATA`] with [`FORMAT_VERSION`].
+/// Key of [`FORMAT_VERSION`] in [`METADATA`].
 pub const FORMAT_KEY: &str = "format";
-/// Key of a digest over a metadata record's name and other entries. MCAP has no checksum for metadata records.
+/// Key of a digest over a metadata record's name and its other entries. MCAP has no checksum for these records.
 pub const DIGEST_KEY: &str = "sha256";
-/// Name of the attachment with the vehicle file.
+/// Name of the attachment that holds the vehicle file.
 pub const VEHICLE_FILE: &str = "vehicle.toml";
-/// Key of a channel's metadata: kind of device.
+/// Metadata key of a channel: plugin of the device.
 pub const PLUGIN_KEY: &str = "plugin";
-/// Key of a channel's metadata: connection of the device.
+/// Metadata key of a channel: connection of the device.
 pub const CONNECT_KEY: &str = "connect";
-/// Key of a channel's metadata: the source's number in `/loop/tick`.
+/// Metadata key of a channel: source number in `/loop/tick`.
 pub const SOURCE_KEY: &str = "source";
 
-/// Bytes of a tick message before the order.
+/// Length of a tick message before the list of sources, bytes.
 pub const TICK_HEAD_BYTES: usize = 20;
 
 /// One tick of the loop, as stored in a `/loop/tick` message.
 ///
-/// Layout, little-endian: u64 index of the tick, u64 its time in ns, u32 count, then count u16: the numbers of the
-/// sources whose packets the tick consumed, one entry per packet, in the order of consumption. A source's packets are
-/// consumed in the order of their sequence numbers, so the list identifies each packet.
+/// Layout, little-endian: u64 index of the tick, u64 time in ns, u32 count, then as many u16. These are the source
+/// numbers of the packets that the tick consumed, one per packet, in the order of consumption. The packets of one
+/// source are consumed in the order of their sequence numbers, so the list identifies every packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tick<'a> {
     /// Number of the tick, from 0.
     pub index: u64,
-    /// The tick's time.
+    /// Time of the tick.
     pub now: MonoNs,
     order: &'a [u8],
 }
 
-/// A malformed `/loop/tick` message.
+/// Error of a malformed `/loop/tick` message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "a tick of {packets} packets takes {TICK_HEAD_BYTES} + 2 * {packets} bytes, and the message has {len}"
 )]
 pub struct TickError {
-    /// Packet count in the message; 0 where it is too short to have one.
+    /// Packet count stated in the message; 0 if the message is too short to state one.
     pub packets: u32,
-    /// Message length, bytes.
+    /// Length of the message, bytes.
     pub len: usize,
 }
 
 impl<'a> Tick<'a> {
-    /// Reads a message.
+    /// Decodes a message, without allocation.
     ///
-    /// Errors: the length doesn't match the count. Allocates: never.
+    /// Errors: the length doesn't match the count.
     pub fn decode(message: &'a [u8]) -> Result<Self, TickError> {
         let fields = || {
             let mut fields = super::fields::Fields::new(message);
@@ -105,13 +109,13 @@ impl<'a> Tick<'a> {
         Ok(Self { index, now: MonoNs(now), order })
     }
 
-    /// Numbers of the sources in the order of consumption of their packets.
+    /// Returns the source numbers of the packets, in the order of consumption.
     pub fn order(&self) -> impl ExactSizeIterator<Item = u16> + 'a {
         self.order.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair))
     }
 }
 
-/// A tick message's bytes before the order. Allocates: never.
+/// Encodes a tick message up to the list of sources, without allocation.
 pub(super) fn tick_head(index: u64, now: MonoNs, packets: u32) -> [u8; TICK_HEAD_BYTES] {
     let mut head = [0; TICK_HEAD_BYTES];
     let values = index.to_le_bytes().into_iter().chain(now.0.to_le_bytes()).chain(packets.to_le_bytes());
@@ -119,18 +123,18 @@ pub(super) fn tick_head(index: u64, now: MonoNs, packets: u32) -> [u8; TICK_HEAD
     head
 }
 
-/// The bytes of `order` as stored in the message.
+/// Returns the bytes of the list of sources in the message.
 pub(super) fn order_bytes(order: &[u16]) -> impl Iterator<Item = u8> {
     order.iter().flat_map(|source| source.to_le_bytes())
 }
 
-/// Formats a loss for [`LOSSES`].
+/// Formats a loss as the value of a [`LOSSES`] entry.
 pub(super) fn stated_loss(from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> String {
     let time = |time: Option<MonoNs>| time.map_or_else(|| "-".to_owned(), |time| time.0.to_string());
     format!("{} {} {words}", time(from), time(to))
 }
 
-/// Parses the text of [`stated_loss`]: from, to, words.
+/// Parses the text of [`stated_loss`] into from, to and words.
 pub(super) fn read_loss(text: &str) -> (Option<MonoNs>, Option<MonoNs>, &str) {
     let mut parts = text.splitn(3, ' ');
     let mut time = || parts.next().and_then(|time| time.parse().ok()).map(MonoNs);
@@ -138,14 +142,16 @@ pub(super) fn read_loss(text: &str) -> (Option<MonoNs>, Option<MonoNs>, &str) {
     (from, to, parts.next().unwrap_or(text))
 }
 
-/// Adds the digest of the name and the other entries to a metadata record.
+/// Adds the digest of a metadata record's name and entries to the record.
 pub(super) fn seal(name: &str, mut metadata: BTreeMap<String, String>) -> BTreeMap<String, String> {
     metadata.remove(DIGEST_KEY);
     metadata.insert(DIGEST_KEY.to_owned(), digest_of(name, &metadata));
     metadata
 }
 
-/// Removes the digest from a metadata record; `false` if it doesn't match. Other writers' records need no digest.
+/// Removes the digest from a metadata record. Returns `false` if it doesn't match.
+///
+/// Records of other writers need no digest.
 pub(super) fn unseal(name: &str, metadata: &mut BTreeMap<String, String>) -> bool {
     match metadata.remove(DIGEST_KEY) {
         Some(digest) => digest == digest_of(name, metadata),
@@ -163,7 +169,7 @@ fn digest_of(name: &str, metadata: &BTreeMap<String, String>) -> String {
     hex(&hasher.finalize())
 }
 
-/// Bytes as lower-case hex without spaces.
+/// Formats bytes as lower-case hex without spaces.
 pub(super) fn hex(bytes: &[u8]) -> String {
     let digits = |byte: &u8| [byte >> 4, byte & 0xF].map(|digit| char::from_digit(digit.into(), 16));
     bytes.iter().flat_map(digits).flatten().collect()
@@ -181,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tick_has_the_documented_layout() {
+    fn tick_message_has_the_documented_layout() {
         let bytes = [1, 0, 0, 0, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 5, 0, 0, 1, 5, 0];
         assert_eq!(encode(1, 258, &[5, 256, 5]), bytes);
         let tick = Tick::decode(&bytes).unwrap();
@@ -199,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_changed_metadata_record_is_noticed() {
+    fn changed_metadata_record_fails_its_digest() {
         let plain = BTreeMap::from([("a".to_owned(), "b".to_owned()), ("c".to_owned(), String::new())]);
         let mut sealed = seal("m", plain.clone());
         assert!(!unseal("n", &mut sealed.clone()));
@@ -222,7 +228,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_decode_or_give_an_error(bytes: Vec<u8>) {
+        fn any_bytes_decode_to_a_tick_or_an_error(bytes: Vec<u8>) {
             if let Ok(tick) = Tick::decode(&bytes) {
                 prop_assert_eq!(TICK_HEAD_BYTES + 2 * tick.order().len(), bytes.len());
             }

@@ -1,9 +1,10 @@
 //! Finds record boundaries in a file that may be damaged.
 //!
-//! A record consists of an opcode, a u64 length and that many bytes, without a start marker. A wrong length therefore
-//! loses everything after it. Three checks detect a wrong length. First, most kinds of records imply their length
-//! twice, by record length and field lengths. Second, a length must leave room for the next record. Third, a record
-//! must follow.
+//! A record is an opcode, a u64 length and that many bytes. It has no start marker, so a wrong length would lose
+//! everything after it.
+//!
+//! Three checks detect a wrong length. Most kinds of record imply their length twice, by the record length and by the
+//! lengths of fields. A length must leave room for the next record. Another record must follow.
 //!
 //! Source: MCAP format specification, "Records".
 
@@ -19,13 +20,13 @@ use super::format::LIBRARY;
 use super::limits::map_cost;
 use super::medium::Medium;
 
-/// Greatest plausible length of a record other than a chunk or attachment; a greater one counts as damage.
+/// Maximum plausible length of a record that is neither a chunk nor an attachment. A greater length counts as damage.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
-/// Opcode and length.
+/// Length of opcode and length field, bytes.
 const RECORD_HEAD_BYTES: usize = 9;
-/// Bytes of a record that are read to identify it: fields of fixed length, and names.
+/// Maximum number of bytes read to identify a record. They hold fields of fixed length, and names.
 const GLANCE_BYTES: usize = 1024;
-/// Bytes of a chunk record before its data, without the name of the compression.
+/// Length of a chunk record before its data, without the name of the compression, bytes.
 const CHUNK_HEAD_BYTES: u64 = 40;
 
 /// Random access to a log's bytes.
@@ -46,7 +47,7 @@ impl<R: Read + Seek> LogFile<R> {
         self.medium().len()
     }
 
-    /// The file's medium.
+    /// Returns the medium of the file.
     pub(super) fn medium(&self) -> &Medium<R> {
         self.input.get_ref()
     }
@@ -55,7 +56,7 @@ impl<R: Read + Seek> LogFile<R> {
         &self.name
     }
 
-    /// Reads from `at` until `into` is full or the file ends; returns the number of bytes.
+    /// Reads from `at` until `into` is full or the file ends. Returns the number of bytes.
     ///
     /// Bytes that the medium fails to read become zeros.
     pub(super) fn read_at(&mut self, at: u64, into: &mut [u8]) -> Result<usize, LogError> {
@@ -78,7 +79,7 @@ impl<R: Read + Seek> LogFile<R> {
         Ok(done)
     }
 
-    /// Up to `len` bytes at `at`, fewer at the end of the file. The caller bounds `len`.
+    /// Reads up to `len` bytes at `at`; fewer at the end of the file. The caller must bound `len`.
     pub(super) fn bytes_at(&mut self, at: u64, len: u64) -> Result<Vec<u8>, LogError> {
         let len = len.min(self.len().saturating_sub(at));
         let mut bytes = vec![0; usize::try_from(len).unwrap_or(0)];
@@ -88,17 +89,17 @@ impl<R: Read + Seek> LogFile<R> {
     }
 }
 
-/// A channel's definition.
+/// Definition of a channel.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Definition {
     pub(super) id: u16,
     pub(super) topic: String,
     pub(super) metadata: BTreeMap<String, String>,
-    /// Schema and message encoding, for logs of other writers. This program's logs neither need nor repeat them.
+    /// Schema number and message encoding, for logs of other writers. This program's logs don't need them.
     pub(super) form: Option<(u16, String)>,
 }
 
-/// Compares the fields that the log's channel list contains; `form` is left out.
+/// Compares the fields that the log's list of channels contains, so without `form`.
 impl PartialEq for Definition {
     fn eq(&self, other: &Self) -> bool {
         (self.id, &self.topic, &self.metadata) == (other.id, &other.topic, &other.metadata)
@@ -115,7 +116,7 @@ impl Definition {
         Some(Self { id, topic: topic.to_owned(), metadata: fields.map()?, form })
     }
 
-    /// Memory of the definition, see [`map_cost`].
+    /// Returns the memory of the definition, see [`map_cost`].
     pub(super) fn cost(&self) -> u64 {
         let form = self.form.as_ref().map_or(0, |(_, encoding)| encoding.len());
         let texts = self.metadata.iter().map(|(key, value)| key.len() + value.len());
@@ -129,7 +130,7 @@ pub(super) fn schema(fields: &mut Fields<'_>) -> Option<(u16, String)> {
     Some((fields.u16()?, fields.text()?.to_owned()))
 }
 
-/// A chunk: position of its data and fields of its header.
+/// A chunk: the position of its data, and the fields of its header.
 #[derive(Debug, Clone)]
 pub(super) struct ChunkPlace {
     pub(super) data: u64,
@@ -137,24 +138,24 @@ pub(super) struct ChunkPlace {
     pub(super) unpacked_len: u64,
     pub(super) crc: u32,
     pub(super) compression: String,
-    /// First and last log time of its messages; both 0 if there are none.
+    /// First and last log time of the messages; both 0 if the chunk has none.
     pub(super) times: (u64, u64),
-    /// Whether the file ends within it.
+    /// Whether the file ends within the chunk.
     pub(super) cut: bool,
-    /// Whether its header is damaged: the lengths of its fields contradict the record length.
+    /// Whether the chunk's header is damaged: its field lengths contradict the record length.
     pub(super) doubtful: bool,
 }
 
-/// An attachment: position of its data and fields of its header.
+/// An attachment: its name and lengths.
 #[derive(Debug, Clone)]
 pub(super) struct AttachmentPlace {
     pub(super) name: String,
-    /// Bytes of the record before the data.
+    /// Length of the record before the data, bytes.
     pub(super) head_len: u64,
     pub(super) data_len: u64,
 }
 
-/// Kind of record, with the fields that framing and index need.
+/// Kind of a record, with the fields that framing and scanning need.
 #[derive(Debug, Clone)]
 pub(super) enum Item {
     Header {
@@ -167,7 +168,7 @@ pub(super) enum Item {
     },
     Chunk(ChunkPlace),
     Attachment(AttachmentPlace),
-    /// An attachment whose names are too long to be read.
+    /// An attachment with a name or media type too long to be read.
     UnreadAttachment,
     Metadata,
     Statistics {
@@ -175,7 +176,7 @@ pub(super) enum Item {
         channels: u32,
     },
     DataEnd,
-    /// Start of the summary according to the footer; 0 where there is none.
+    /// Start of the summary as stated by the footer; 0 if there is no summary.
     Footer {
         summary: u64,
     },
@@ -189,16 +190,16 @@ pub(super) struct Frame {
     pub(super) body: u64,
     pub(super) end: u64,
     pub(super) item: Item,
-    /// Whether the lengths of its fields confirm the record length.
+    /// Whether the lengths of the record's fields confirm the record length.
     pub(super) confirmed: bool,
 }
 
-/// Content at a position.
+/// Content found at a position.
 #[derive(Debug)]
 pub(super) enum Found {
     /// A record that lies within the file.
     Record(Frame),
-    /// A record that the end of the file cuts off, or whose length is wrong.
+    /// A record that the end of the file cuts off, or a record with a wrong length.
     Cut(Frame),
     /// The closing magic bytes.
     Closing,
@@ -228,7 +229,7 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
         return Ok(Found::Nothing);
     }
     let mut glance = [0; GLANCE_BYTES];
-    // A chunk is examined whatever length it claims, since it implies a second one.
+    // A chunk is examined whatever its record length is, because its fields imply the length a second time.
     let wanted = if opcode == op::CHUNK { u64::MAX } else { len };
     let wanted = usize::try_from(wanted).unwrap_or(usize::MAX).min(GLANCE_BYTES);
     let got = file.read_at(body, glance.get_mut(..wanted).unwrap_or_default())?;
@@ -239,7 +240,7 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
         Some((Item::Chunk(place), _)) => {
             return look_at_chunk(file, frame(end, Item::Other, false), place);
         }
-        // A message's data has no length field.
+        // The data of a message has no length field, so its fields can't confirm the record length.
         Some((item, inner_len)) if inner_len == len && opcode != op::MESSAGE => {
             return Ok(whole_or_cut(file, frame(end, item, true)));
         }
@@ -254,9 +255,9 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
     Ok(whole_or_cut(file, frame(end, item, false)))
 }
 
-/// Identifies a record whose opcode is damaged by its content.
+/// Identifies a record by its content, for a record whose opcode is damaged.
 fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
-    // A message may contain any bytes, but it is no coincidence if they parse as a chunk with matching lengths.
+    // A message may contain any bytes. But bytes that parse as a chunk with matching lengths are no coincidence.
     let kinds: &[u8] =
         if opcode == op::MESSAGE { &[op::CHUNK] } else { &[op::CHUNK, op::ATTACHMENT, op::METADATA] };
     kinds
@@ -265,12 +266,12 @@ fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
         .map(|it| it.0)
 }
 
-/// Whether an opcode is reserved by MCAP and still unused. Damage easily produces these.
+/// Whether an opcode is reserved by MCAP and not used yet. Damage easily produces such opcodes.
 fn is_reserved(opcode: u8) -> bool {
     (op::DATA_END + 1..0x80).contains(&opcode)
 }
 
-/// The item of a record whose names are longer than [`GLANCE_BYTES`].
+/// Returns the kind of a record whose names don't fit into [`GLANCE_BYTES`].
 fn unread(opcode: u8) -> Item {
     match opcode {
         op::SCHEMA => Item::Schema,
@@ -286,7 +287,7 @@ fn record_head(head: [u8; RECORD_HEAD_BYTES]) -> (u8, u64) {
     (opcode, u64::from_le_bytes(len))
 }
 
-/// Whether a record of that kind can have that length.
+/// Whether a record with this opcode can have this length.
 fn is_possible(opcode: u8, len: u64) -> bool {
     opcode != 0 && (len <= MAX_RECORD_BYTES || matches!(opcode, op::CHUNK | op::ATTACHMENT))
 }
@@ -297,8 +298,8 @@ fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
 
 /// Identifies a chunk, which implies its length twice.
 ///
-/// If the two lengths differ, the one followed by a record is right. If both are the largest u64, its writer had not
-/// closed the chunk.
+/// If the two lengths differ, the length that another record follows is right. If both are the largest u64, the
+/// writer never closed the chunk.
 fn look_at_chunk<R: Read + Seek>(
     file: &mut LogFile<R>,
     mut frame: Frame,
@@ -324,7 +325,7 @@ fn look_at_chunk<R: Read + Seek>(
     Ok(whole_or_cut(file, frame))
 }
 
-/// Whether the bytes at `at` could be a record's header, or the file ends there.
+/// Whether a record's header could be at `at`, or the file ends there.
 fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool, LogError> {
     if at >= file.len() {
         return Ok(at == file.len());
@@ -335,7 +336,7 @@ fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool
     Ok(whole && opcode <= op::DATA_END && is_possible(opcode, len) && len <= file.len() - at)
 }
 
-/// Parses the needed fields of a record, and the least length that its fields imply.
+/// Parses the fields that are needed of a record. Also returns the minimum record length that they imply.
 fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     let mut fields = Fields::new(bytes);
     let item = match opcode {
@@ -368,7 +369,7 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
         }
         op::ATTACHMENT => {
             let place = attachment_place(&mut fields)?;
-            // An attachment of almost 2^64 bytes is damaged rather than a record of another kind.
+            // This sum can overflow only in a damaged attachment, which is still recognised as an attachment.
             let len = place.head_len.saturating_add(place.data_len).saturating_add(4);
             return Some((Item::Attachment(place), len));
         }
@@ -409,7 +410,7 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     Some((item, fields.taken()))
 }
 
-/// The item, with the record length implied by a trailing length-prefixed list.
+/// Returns the item, and the record length that a list at the end of the record implies.
 fn with_list(mut fields: Fields<'_>, item: Item) -> Option<(Item, u64)> {
     let len = fields.u32()?;
     Some((item, fields.taken() + u64::from(len)))

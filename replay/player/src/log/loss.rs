@@ -1,4 +1,4 @@
-//! Losses of a damaged log, with their positions.
+//! Losses of a damaged log, each with its position.
 
 use core::fmt;
 
@@ -7,131 +7,134 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::LATEST;
 
-/// Maximum number of losses that are listed; later ones extend the last entry.
+/// Maximum number of losses in the list. Later losses extend the last entry.
 const MAX_LOSSES: usize = 1000;
 
 /// Kind of damage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum LossKind {
-    /// The file ends before its closing records: recording or copying was interrupted.
+    /// The file ends before its closing records, because recording or copying was interrupted.
     Truncated,
-    /// Bytes that aren't records: wrong lengths, or overwritten.
+    /// Bytes that aren't records, because lengths are wrong or bytes were overwritten.
     Framing,
     /// A chunk with a wrong checksum. None of its messages is delivered.
     Checksum,
-    /// A chunk that can't be unpacked, or contains something other than records. None of its messages is delivered.
+    /// A chunk that can't be unpacked, or has content other than records. None of its messages is delivered.
     Contents,
-    /// A chunk or messages outside chunks that the medium fails to read, with the error.
+    /// A chunk, or messages outside chunks, that the medium fails to read; with the medium's error.
     Unreadable(String),
     /// A chunk with an unsupported compression.
     Compression(String),
-    /// A chunk or attachment larger than the limit for reading into memory.
+    /// A chunk or attachment that exceeds the limit for reading into memory.
     TooLarge {
         /// Limit, bytes.
         limit: u64,
     },
-    /// Chunks that claim to unpack to many times the length of the log. None of their messages is delivered.
+    /// Chunks that would unpack to many times the length of the log. None of their messages is delivered.
     Swells {
-        /// Limit, as a multiple of the log's length up to there.
+        /// Limit, as a multiple of the log's length up to the chunk.
         limit: u64,
     },
-    /// A chunk whose unpacking would exceed the memory limit.
+    /// A chunk that would take more memory to unpack than allowed.
     Window {
         /// Limit, bytes.
         limit: u64,
     },
-    /// More items of a kind than the limit allows.
+    /// There are more items of a kind than allowed.
     Beyond {
         /// Kind of item.
         what: Many,
         /// Limit.
         limit: u64,
     },
-    /// Messages with a timestamp beyond the limit.
+    /// Messages with a timestamp later than allowed.
     Stamped {
-        /// Messages not delivered.
+        /// Number of messages not delivered.
         messages: u64,
-        /// The first one's timestamp, ns.
+        /// Earliest timestamp of these messages, ns.
         first: u64,
     },
-    /// An attachment that fails its checksum, or that the log lists but doesn't contain.
+    /// An attachment that fails its checksum, or that the log lists but doesn't have.
     Attachment(String),
-    /// A metadata record that fails its checksum, or is missing from a log of this program.
+    /// A metadata record that fails its digest, or is missing from a log of this program.
     Metadata(String),
-    /// Messages missing from a log of this program, found by gaps in the message numbers.
+    /// Messages missing from a log of this program, as gaps in the message numbers show.
     Missing {
-        /// Messages missing.
+        /// Number of missing messages.
         messages: u64,
     },
-    /// Messages in a log of this program whose numbers occur before.
+    /// Messages in a log of this program whose numbers have occurred before.
     Repeated {
-        /// Messages delivered again.
+        /// Number of messages delivered again.
         messages: u64,
     },
-    /// Messages in a log of this program that follow messages with higher numbers.
+    /// Messages in a log of this program that come after messages with higher numbers.
     Disordered {
-        /// Messages delivered too late.
+        /// Number of messages delivered too late.
         messages: u64,
     },
-    /// A record in a chunk that no chunk may contain, such as another chunk.
+    /// A record in a chunk that isn't allowed in chunks, such as another chunk.
     Misplaced,
-    /// Messages of a channel whose definition isn't in the log.
+    /// Messages of a channel whose definition is missing from the log.
     UnknownChannel {
-        /// The channel's number.
+        /// Channel number.
         channel: u16,
-        /// Messages not delivered.
+        /// Number of messages not delivered.
         messages: u64,
     },
-    /// A second definition of a channel that contradicts the first, which is kept.
+    /// A second definition of a channel that contradicts the first one. The first is used.
     Conflict {
-        /// The channel's number.
+        /// Channel number.
         channel: u16,
     },
-    /// All records are readable, but the log's end isn't where the footer says: records are missing or inserted.
+    /// All records are readable, but the summary isn't where the footer says, so records are missing or were
+    /// inserted.
     Displaced,
-    /// All records are readable, but their common checksum doesn't match: a byte has changed at an unknown position.
+    /// All records are readable, but their common checksum doesn't match, so a byte has changed at an unknown
+    /// position.
     DataSection,
-    /// Damage of one part of a recording.
+    /// Damage in one part of a recording.
     InPart {
-        /// The part's number.
+        /// Part number.
         part: u32,
         /// The damage.
         kind: Box<LossKind>,
     },
-    /// Missing parts of a recording, from first to last; the last is `None` where unknown.
+    /// Parts missing from a recording; the last one is `None` if unknown.
     PartsMissing {
         /// First missing part.
         first: u32,
         /// Last missing part.
         last: Option<u32>,
     },
-    /// A part whose content disagrees with the totals of its neighbours.
+    /// A part whose totals contradict those in the next part's header.
     PartUnlike {
-        /// The part's number.
+        /// Part number.
         part: u32,
-        /// Messages up to and including this part, by its own total.
+        /// Number of messages up to the end of this part, as this part states it.
         messages: u64,
-        /// The same total by the next part's header.
+        /// The same number, as the next part's header states it.
         wanted: u64,
     },
     /// A part of a recording that isn't an MCAP file.
     PartUnreadable {
-        /// The part number in the file name.
+        /// Part number in the file name.
         part: u32,
-        /// Its first bytes, in hex.
+        /// First bytes of the file, in hex.
         found: String,
     },
-    /// A part whose part record is unreadable; its number was taken from the file name.
+    /// A part whose part metadata is unreadable. Its number was taken from the file name.
     PartByName {
-        /// The part's number.
+        /// Part number.
         part: u32,
     },
-    /// A loss stated by the log itself: the recorder left messages out, or the log was recovered from a damaged one.
+    /// A loss that the log itself states: the recorder left messages out, or the log was recovered from a damaged
+    /// one.
     Stated(String),
 }
 
-/// Kinds of items that have a limit.
+/// Kinds of items whose number is limited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Many {
     /// Chunks, and runs of messages outside chunks.
@@ -140,9 +143,9 @@ pub enum Many {
     Channels,
     /// Sources.
     Sources,
-    /// Bytes of definitions and metadata.
+    /// Memory of definitions and metadata, bytes.
     HeaderBytes,
-    /// Bytes of attachments.
+    /// Memory of attachments, bytes.
     AttachmentBytes,
 }
 
@@ -158,7 +161,7 @@ impl Many {
     }
 }
 
-/// One damaged range of a log.
+/// A loss: a damaged range of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Loss {
     /// The damage.
@@ -167,9 +170,9 @@ pub struct Loss {
     pub offset: u64,
     /// Length in the file, bytes.
     pub bytes: u64,
-    /// First receive time after it, if any.
+    /// Last receive time before the loss; `None` if unknown.
     pub from: Option<MonoNs>,
-    /// First receive time after it, where there is one.
+    /// First receive time after the loss; `None` if unknown.
     pub to: Option<MonoNs>,
 }
 
@@ -236,7 +239,7 @@ impl fmt::Display for LossKind {
 }
 
 impl LossKind {
-    /// Writes the text of a loss that concerns a whole part.
+    /// Writes the text of a loss that concerns a part as a whole.
     fn write_of_part(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PartsMissing { first, last: None } => {
@@ -250,7 +253,7 @@ impl LossKind {
             }
             Self::PartUnlike { part, messages, wanted } => write!(
                 out,
-                "part {part} is not the one that was recorded: with it there are {messages} messages; the next part states \
+                "part {part} is not the one that was recorded: it states {messages} messages so far, and the next part \
                  {wanted}"
             ),
             Self::PartUnreadable { part, found } => {
@@ -263,7 +266,7 @@ impl LossKind {
         }
     }
 
-    /// Whether it has a byte range in a file.
+    /// Whether the loss has a range of bytes in a file.
     fn has_place(&self) -> bool {
         match self {
             Self::InPart { kind, .. } => kind.has_place(),
@@ -294,7 +297,7 @@ impl fmt::Display for Loss {
     }
 }
 
-/// The list of losses, bounded.
+/// List of losses with limited length.
 #[derive(Debug, Default)]
 pub(super) struct Losses(Vec<Loss>);
 
@@ -311,12 +314,12 @@ impl Losses {
         &mut self.0
     }
 
-    /// Whether the list is full, so that further losses only extend the last entry.
+    /// Whether the list is full. Further losses then only extend the last entry.
     pub(super) fn is_full(&self) -> bool {
         self.0.len() >= MAX_LOSSES
     }
 
-    /// Adds a range to the loss of that kind; each kind is listed once.
+    /// Adds a range to the loss of the same kind. Each of these kinds has only one entry in the list.
     pub(super) fn extend(&mut self, kind: LossKind, offset: u64, bytes: u64) {
         if let Some(known) = self.0.iter_mut().rev().find(|loss| loss.kind == kind) {
             known.bytes = known.bytes.saturating_add(bytes);

@@ -1,27 +1,27 @@
-//! A log's medium, parts of which may be unreadable.
+//! The medium of a log. Some of its bytes may be unreadable.
 
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 use std::ops::Range;
 
-/// Smallest unit treated as unreadable: a sector of a disk.
+/// Length of a disk sector, the smallest unit treated as unreadable, bytes.
 const SECTOR_BYTES: u64 = 512;
-/// Maximum number of unreadable ranges kept apart; further ones are joined, including the bytes between them.
+/// Maximum number of unreadable ranges kept. Further ranges are joined to the last, including the bytes between.
 const MOST_RANGES: usize = 1024;
 
-/// Returns zeros for unreadable bytes and records their ranges; content elsewhere may be intact.
+/// Reads zeros in place of unreadable bytes, and records their ranges. Bytes elsewhere may be intact.
 pub(super) struct Medium<R> {
     input: R,
     at: u64,
     len: u64,
     failed: Vec<Range<u64>>,
-    /// The first error.
+    /// Text of the first error.
     error: String,
 }
 
 impl<R: Read + Seek> Medium<R> {
     /// Creates the medium.
     ///
-    /// Errors: the length can't be determined.
+    /// Errors: the length of the input can't be determined.
     pub(super) fn new(mut input: R) -> Result<Self> {
         let len = input.seek(SeekFrom::End(0))?;
         input.rewind()?;
@@ -37,12 +37,12 @@ impl<R: Read + Seek> Medium<R> {
         self.failed.iter().any(|failed| failed.start < part.end && part.start < failed.end)
     }
 
-    /// The ranges found unreadable so far.
+    /// Returns the ranges found unreadable so far.
     pub(super) fn failed(&self) -> &[Range<u64>] {
         &self.failed
     }
 
-    /// The first error.
+    /// Returns the text of the first error.
     pub(super) fn error(&self) -> &str {
         &self.error
     }

@@ -1,4 +1,6 @@
-//! Merges the messages of the pieces in memory into one order.
+//! Merges the messages of several pieces in memory into one order.
+//!
+//! A piece is a chunk, or a run of messages outside chunks.
 
 use core::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -6,7 +8,7 @@ use std::collections::binary_heap::PeekMut;
 
 use super::fields::{Fields, MessageHead};
 
-/// Number of used-up batches kept for reuse, and the most bytes of each, enough for one chunk of this program's logs.
+/// Number of used batches kept for reuse, and maximum memory of each. A chunk of this program's logs fits.
 const KEPT: usize = 4;
 const KEPT_BYTES: usize = 3 << 20;
 
@@ -14,7 +16,7 @@ const KEPT_BYTES: usize = 3 << 20;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
     pub(super) head: MessageHead,
-    /// See [`super::channels::Channel::rank`].
+    /// Sort rank of the channel, see [`super::channels::Channel::rank`].
     pub(super) rank: u32,
     start: usize,
     end: usize,
@@ -35,7 +37,7 @@ impl Batch {
         self.next = 0;
     }
 
-    /// Adds a message record; `false` if it doesn't parse.
+    /// Adds a message record. Returns `false` if it doesn't parse.
     pub(super) fn push(&mut self, record: &[u8]) -> bool {
         let mut fields = Fields::new(record);
         let Some(head) = MessageHead::read(&mut fields) else { return false };
@@ -50,18 +52,18 @@ impl Batch {
     }
 }
 
-/// Sort key of messages: time, rank and sequence if requested, then the position in the file.
+/// Sort key of a message: time, rank and sequence, or zeros for file order; then the position in the file.
 type Key = (u64, u32, u32, usize, usize);
 
-/// The pieces in memory.
+/// Pieces in memory, whose messages are being merged.
 #[derive(Debug)]
 pub(super) struct Merge {
     by_time: bool,
     heads: BinaryHeap<Reverse<(Key, usize)>>,
     batches: Vec<Batch>,
-    /// Used-up batches, for reuse.
+    /// Indexes of empty batches that can be reused.
     spare: Vec<usize>,
-    /// Batches used up since the last piece was read.
+    /// Indexes of batches used up since the last piece was read.
     released: Vec<usize>,
     memory: usize,
 }
@@ -78,19 +80,19 @@ impl Merge {
         }
     }
 
-    /// Memory of the pieces, bytes.
+    /// Returns the memory of the pieces, bytes.
     pub(super) fn memory(&self) -> usize {
         self.memory
     }
 
-    /// Log time of the next message.
+    /// Returns the log time of the next message.
     pub(super) fn next_time(&self) -> Option<u64> {
         self.heads.peek().map(|Reverse(((time, ..), _))| *time)
     }
 
-    /// An empty batch to fill, which reuses the memory of a used-up one.
+    /// Returns an empty batch, which reuses the memory of a used one.
     pub(super) fn empty_batch(&mut self) -> Batch {
-        // Released only here, because the bytes of the last returned message may be in one of them.
+        // Batches are released only here, because the last returned message may still be in one of them.
         for slot in self.released.drain(..) {
             if let Some(batch) = self.batches.get_mut(slot)
                 && (batch.memory() > KEPT_BYTES || self.spare.len() >= KEPT)
@@ -105,7 +107,7 @@ impl Merge {
         batch
     }
 
-    /// Adds the messages of piece `span`, starting with message number `next`.
+    /// Adds the messages of piece number `span`, beginning with message number `next`.
     pub(super) fn add(&mut self, span: usize, mut batch: Batch, next: usize) {
         if self.by_time {
             batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));
@@ -125,7 +127,7 @@ impl Merge {
         }
     }
 
-    /// The pieces in memory, with the number of messages taken from each.
+    /// Returns the pieces in memory, each with the number of messages taken from it.
     pub(super) fn open(&self) -> impl Iterator<Item = (usize, usize)> {
         self.heads.iter().map(|Reverse(((_, _, _, span, next), _))| (*span, *next))
     }
@@ -144,7 +146,7 @@ impl Merge {
         let batch = self.batches.get_mut(slot)?;
         let entry = *batch.entries.get(batch.next)?;
         batch.next += 1;
-        // The next message is usually from the same batch, which then stays at the top.
+        // The next message is usually from the same batch, whose new key then stays at the top of the heap.
         if let Some(key) = key(self.by_time, span, batch) {
             *head = Reverse((key, slot));
         } else {
@@ -154,7 +156,7 @@ impl Merge {
         Some((entry, slot))
     }
 
-    /// Bytes of a message returned by [`Merge::pop`].
+    /// Returns the bytes of a message that [`Merge::pop`] has returned.
     pub(super) fn bytes(&self, entry: &Entry, slot: usize) -> &[u8] {
         self.batches.get(slot).and_then(|batch| batch.bytes.get(entry.start..entry.end)).unwrap_or_default()
     }
@@ -165,7 +167,7 @@ impl Merge {
     }
 }
 
-/// Sort key of a batch's next message.
+/// Returns the sort key of a batch's next message.
 fn key(by_time: bool, span: usize, batch: &Batch) -> Option<Key> {
     let Entry { head, rank, .. } = batch.entries.get(batch.next)?;
     let (time, rank, sequence) = if by_time { (head.log_time, *rank, head.sequence) } else { (0, 0, 0) };

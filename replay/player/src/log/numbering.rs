@@ -1,7 +1,7 @@
 //! Finds missing, repeated and reordered messages in this program's logs by their message numbers.
 //!
-//! Each channel counts its messages, and the count continues from part to part. A checksum covers one record; it can't
-//! show that a whole record was removed, repeated or moved. The numbers can.
+//! Each channel counts its messages, and continues the count from part to part. A checksum covers one record, so it
+//! can't show that a whole record was removed, repeated or moved. The numbers can.
 
 use std::collections::BTreeMap;
 
@@ -15,10 +15,10 @@ use super::part::{PART_END, Part};
 use super::scan::{Scan, Span};
 use super::{Loss, LossKind};
 
-/// Maximum number of runs kept per channel. An intact log has one run, and a few while pieces are read out of order.
+/// Maximum number of runs kept per channel. An intact log has one run, or a few while pieces are read out of order.
 const MAX_RUNS: usize = 64;
 
-/// Consecutive message numbers of a channel: pieces and numbers of the first and last.
+/// A run of consecutive message numbers of a channel: first and last piece, first and last number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 struct Run {
     pieces: (usize, usize),
@@ -26,21 +26,21 @@ struct Run {
     last: u64,
 }
 
-/// The numbers of a channel's messages read so far.
+/// Message numbers of a channel read so far.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Count {
-    /// Number of the channel's first message.
+    /// Expected number of the channel's first message.
     first: u64,
     runs: Vec<Run>,
 }
 
-/// The message numbers of everything read so far.
+/// Message numbers of all channels read so far.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(super) struct Numbering {
     channels: BTreeMap<u16, Count>,
-    /// Messages read.
+    /// Number of messages read.
     messages: u64,
-    /// Number of messages in the log according to its closing records.
+    /// Number of messages that the closing records of the log state.
     wanted: Option<u64>,
 }
 
@@ -52,22 +52,24 @@ enum Fault {
     Disordered,
 }
 
-/// A place between pieces where consecutive numbers are interrupted.
+/// A place between pieces at which the numbers of a channel are not consecutive.
 #[derive(Debug)]
 struct Break {
     fault: Fault,
     messages: u64,
-    /// First and last piece before which the break may lie; the number of pieces means the end of the log.
+    /// The break lies before one of these pieces: first and last. The number of all pieces stands for the end of the
+    /// log.
     pieces: (usize, usize),
 }
 
 impl Numbering {
-    /// Creates the numbering of a log with these channels that ends at `end`.
+    /// Creates the numbering of a log with these channels. `end` is the length of the log.
     ///
-    /// `None` for logs of other writers, which may number as they like. Reports a part that is closed but has no end
-    /// record.
+    /// Returns `None` for logs of other writers, which may number messages in any way.
+    ///
+    /// Also reports a part that was closed without an end record.
     pub(super) fn of(scan: &mut Scan, part: Option<&Part>, channels: &Channels, end: u64) -> Option<Self> {
-        // A log that wasn't closed has a loss already.
+        // A log that was not closed already has a loss.
         if part.is_some_and(|part| part.end.is_none()) && scan.losses.list().is_empty() {
             let kind = LossKind::Metadata(PART_END.to_owned());
             scan.losses.push(Loss { kind, offset: end, bytes: 0, from: None, to: None });
@@ -82,18 +84,18 @@ impl Numbering {
         Some(Self { channels, messages: 0, wanted })
     }
 
-    /// Adds the messages of a piece, in their order.
+    /// Adds the messages of a piece, in file order.
     pub(super) fn add(&mut self, piece: usize, entries: &[Entry]) {
         for head in entries.iter().map(|entry| entry.head) {
             self.messages += 1;
-            // Messages of an undefined channel are reported as a separate loss.
+            // Messages of undefined channels are reported as another kind of loss.
             if let Some(count) = self.channels.get_mut(&head.channel) {
                 count.add(piece, head.sequence);
             }
         }
     }
 
-    /// Adds the losses of a completely read log, except at places with a known loss.
+    /// Adds the losses found in a log that has been read to its end, except where a known loss explains them.
     pub(super) fn report(&self, spans: &[Span], losses: &mut Losses) {
         let known = losses.list();
         let mut found: Vec<Break> = self.channels.values().flat_map(Count::breaks).collect();
@@ -120,24 +122,24 @@ impl Numbering {
         }
     }
 
-    /// Number of messages missing at the log's end, where no gap in the numbers shows them.
+    /// Returns the number of messages missing at the log's end, where no later message shows a gap.
     fn missing(&self, wanted: u64, found: &[Break]) -> u64 {
         let sum = |fault| found.iter().filter(|one| one.fault == fault).map(|one| one.messages).sum::<u64>();
         wanted.saturating_add(sum(Fault::Repeated)).saturating_sub(self.messages + sum(Fault::Missing))
     }
 }
 
-/// Whether a loss can't affect the number of messages before the closing records.
+/// Whether a loss leaves the number of messages before the closing records unchanged.
 fn is_elsewhere(known: &Loss) -> bool {
     matches!(known.kind, LossKind::Stated(_) | LossKind::Misplaced | LossKind::Truncated)
 }
 
-/// Whether a known loss may explain a break between two offsets.
+/// Whether a known loss may explain a break between two file offsets.
 fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
     match known.kind {
-        // Stated by the log's writer, which numbers only messages that it writes.
+        // The log's writer stated this loss. It numbers only messages that it writes, so the loss leaves no break.
         LossKind::Stated(_) => false,
-        // One such loss covers several places.
+        // A loss of these kinds may cover several places, but has only one range.
         LossKind::Swells { .. } | LossKind::Beyond { .. } | LossKind::Unreadable(_) => true,
         _ => known.offset <= to && from <= known.offset.saturating_add(known.bytes),
     }
@@ -150,13 +152,13 @@ impl Break {
         self.fault == other.fault && first <= last
     }
 
-    /// Narrows the place with the break of another channel. A channel with few messages leaves a wide gap.
+    /// Merges the break of another channel, and narrows the place. A channel with few messages leaves a wide gap.
     fn add(&mut self, other: &Self) {
         self.messages += other.messages;
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
     }
 
-    /// File offsets between which the break lies.
+    /// Returns the file offsets between which the break lies.
     fn place(&self, spans: &[Span]) -> (u64, u64) {
         let before = self.pieces.0.checked_sub(1).and_then(|piece| spans.get(piece));
         let from = before.map_or(0, |span| span.end);
@@ -182,7 +184,7 @@ impl Break {
 
 impl Count {
     fn add(&mut self, piece: usize, number: u32) {
-        // Numbers wrap at 32 bits; this picks the nearest one to the last.
+        // Numbers wrap at 32 bits. The number nearest to the last one is meant.
         let near = self.runs.last().map_or(self.first, |run| run.last);
         let low = u64::from(number.wrapping_sub(low_word(near)));
         let ahead = low <= u64::from(u32::MAX / 2);
@@ -196,7 +198,7 @@ impl Count {
             return;
         };
         (run.last, run.pieces.1) = (number, piece);
-        // Pieces may be read in another order than that of the file, so this one may close a gap.
+        // Pieces may be read in another order than that of the file, so this number may close a gap between two runs.
         let after = self.runs.iter().position(|run| run.first == number + 1 && piece < run.pieces.0);
         let after =
             after.filter(|at| self.runs.get(*at).is_some_and(|run| self.is_clear(piece, run.pieces.0 - 1)));
@@ -209,12 +211,13 @@ impl Count {
         }
     }
 
-    /// Whether a run that ends in one piece may continue in another: later, and with no other run between.
+    /// Whether a run that ends in piece `from` may continue in piece `to`: not earlier, and with no other run
+    /// between.
     fn is_clear(&self, from: usize, to: usize) -> bool {
         from <= to && !self.runs.iter().any(|run| from < run.pieces.1 && run.pieces.0 <= to)
     }
 
-    /// The places where consecutive numbers are interrupted, or continue elsewhere in the file.
+    /// Returns the places where numbers are missing or repeated, or continue elsewhere in the file.
     fn breaks(&self) -> Vec<Break> {
         let mut runs = self.runs.clone();
         runs.sort_by_key(|run| (run.first, run.pieces));
@@ -238,7 +241,7 @@ impl Count {
     }
 }
 
-/// The lower 32 bits.
+/// Returns the lower 32 bits.
 fn low_word(number: u64) -> u32 {
     u32::try_from(number & u64::from(u32::MAX)).unwrap_or_default()
 }

@@ -1,11 +1,11 @@
-//! Metadata of a log that is one part of a dive's recording.
+//! Metadata of a log that is one part of a recording.
 //!
 //! The record `headrace.part` comes before the first message. It has `dive`, `number` (from 1), and the totals of the
-//! earlier parts: `messages` of all channels, `tick` (index of the last, or `-`), and `sequence<topic>` (number of each
-//! channel's next message).
+//! earlier parts: `messages` of all channels, `tick` (index of the last tick, or `-`), and `sequence<topic>` (number
+//! of each channel's next message).
 //!
 //! The record `headrace.part.end` comes after the last message. It has `messages` and `tick` including this part. Its
-//! `follows` is `yes` if the recording continues in the next part, `no` if the dive ended.
+//! `follows` is `yes` if the recording continues in the next part, and `no` if the dive has ended.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -25,26 +25,26 @@ const MESSAGES_KEY: &str = "messages";
 const TICK_KEY: &str = "tick";
 const FOLLOWS_KEY: &str = "follows";
 const SEQUENCE_PREFIX: &str = "sequence";
-/// Text before the part number in a part's file name.
+/// Text before the part number in a file name.
 const NAME_MARK: &str = ".part";
-/// Digits of a dive's identifier.
+/// Number of hex digits in the identifier of a recording.
 const DIVE_DIGITS: usize = 16;
 
-/// Totals of a recording up to some point.
+/// Totals of a recording up to a certain point.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Progress {
-    /// Messages of all channels.
+    /// Number of messages of all channels.
     pub messages: u64,
-    /// Index of the last tick.
+    /// Index of the last tick; `None` before the first.
     pub tick: Option<u64>,
-    /// Next message number of each topic; omitted at the end of a part.
+    /// Number of each topic's next message; empty at the end of a part.
     pub sequences: BTreeMap<String, u32>,
 }
 
 /// Metadata at the start of a part.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PartHead {
-    /// Recording that it belongs to, see [`dive_name`].
+    /// Identifier of the recording that the part belongs to, see [`dive_name`].
     pub dive: String,
     /// Part number, from 1.
     pub number: u32,
@@ -55,7 +55,7 @@ pub struct PartHead {
 /// Metadata at the end of a part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartEnd {
-    /// Totals including this part.
+    /// Totals up to the end of this part.
     pub after: Progress,
     /// Whether another part follows.
     pub follows: bool,
@@ -64,13 +64,13 @@ pub struct PartEnd {
 /// Position of a log in its recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
-    /// Start record.
+    /// Metadata at the start of the part.
     pub head: PartHead,
-    /// End record; `None` where the log was cut off before it.
+    /// Metadata at the end of the part; `None` if the log was cut off before it.
     pub end: Option<PartEnd>,
 }
 
-/// Unique identifier of a recording: a digest of numbers such as start times.
+/// Returns a unique identifier of a recording: a digest of numbers such as start times.
 pub fn dive_name(moment: &[u64]) -> String {
     let mut hasher = Sha256::new();
     for word in moment {
@@ -81,7 +81,7 @@ pub fn dive_name(moment: &[u64]) -> String {
     name
 }
 
-/// File name of a part: `dive.part002.mcap` for `dive.mcap`, so that a folder lists parts in order.
+/// Returns the file name of a part: `dive.part002.mcap` for `dive.mcap`. A folder then lists the parts in order.
 pub fn part_path(recording: &Path, number: u32) -> PathBuf {
     let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
     let (stem, extension) = (text(recording.file_stem()), text(recording.extension()));
@@ -89,7 +89,7 @@ pub fn part_path(recording: &Path, number: u32) -> PathBuf {
     recording.with_file_name(format!("{stem}{NAME_MARK}{number:03}{dot}{extension}"))
 }
 
-/// Recording and part number from a part's file name.
+/// Returns the recording and the part number that a part's file name states.
 pub fn named_part(path: &Path) -> Option<(PathBuf, u32)> {
     let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
     let stem = path.file_stem()?.to_string_lossy().into_owned();
@@ -122,7 +122,7 @@ impl Progress {
         })
     }
 
-    /// Whether both have the same totals, apart from the sequence numbers of topics.
+    /// Whether both totals are equal, apart from the sequence numbers of topics.
     pub(super) fn meets(&self, other: &Self) -> bool {
         (self.messages, self.tick) == (other.messages, other.tick)
     }
@@ -160,19 +160,19 @@ impl PartEnd {
 }
 
 impl Part {
-    /// Messages of this part alone, computed from the totals at its two ends.
+    /// Returns the number of messages in this part alone, from the totals at its two ends.
     pub(super) fn messages(&self) -> Option<u64> {
         self.end.as_ref()?.after.messages.checked_sub(self.head.before.messages)
     }
 
-    /// Removes the part records from a log's metadata and parses them.
+    /// Removes the part metadata from a log's metadata, and parses it.
     pub(super) fn take(metadata: &mut BTreeMap<String, String>) -> Option<Self> {
         let (end, head) = (take_record(metadata, PART_END), take_record(metadata, PART));
         Some(Self { head: PartHead::read(&head)?, end: PartEnd::read(&end) })
     }
 }
 
-/// Removes the entries of the record `name`.
+/// Removes the entries of the record `name`, and returns them.
 fn take_record(metadata: &mut BTreeMap<String, String>, name: &str) -> BTreeMap<String, String> {
     let prefix = format!("{name}/");
     let (mut taken, mut kept) = (BTreeMap::new(), BTreeMap::new());

@@ -1,4 +1,4 @@
-//! The queue between the loop and the recorder's thread: its entries, and the state shared by both ends.
+//! The queue from the loop to the recorder's thread: its entries, and the state that both ends share.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -13,7 +13,7 @@ use super::fault::RecordingEvent;
 use super::fields::Fields;
 use super::writer::Lane;
 
-/// An entry didn't fit in the queue; nothing of it was written.
+/// An entry doesn't fit in the queue. Nothing of it was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
 pub struct Full {
@@ -23,62 +23,63 @@ pub struct Full {
     pub needed: usize,
 }
 
-/// Header of each entry in the queue: kind, a spare byte, number, length, log time, publish time.
+/// Length of an entry's header: kind, a spare byte, number, length, log time, publish time.
 pub(super) const ENTRY_HEAD_BYTES: usize = 24;
 
-/// State shared by both ends of a recorder, apart from the queue.
+/// State that both ends of a recorder share, apart from the queue.
 pub(super) struct State {
     pub(super) stopping: AtomicBool,
-    /// Whether nothing empties the queue any more.
+    /// Whether the recorder has ended, so that the queue is no longer emptied.
     pub(super) closed: AtomicBool,
-    /// Whether nothing is being recorded at present.
+    /// Whether nothing is being recorded at present, because of an error.
     pub(super) failing: AtomicBool,
-    /// Ticks that this recorder was too far behind to take.
+    /// Ticks that the loop skipped because the recorder was too far behind.
     pub(super) gaps: ArrayQueue<Gap>,
-    /// Log time of the last tick that the loop handed over or skipped, and log time up to which data is synced or given
-    /// up, ns. Both are 0 before the first.
+    /// Two log times, ns; both are 0 before the first tick.
+    /// The time of the last tick that the loop recorded or skipped, and the time up to which data is synced or given
+    /// up.
     pub(super) handed_ns: AtomicU64,
     pub(super) certain_ns: AtomicU64,
-    /// Number of steps; it distinguishes a stuck recorder from a slow one.
+    /// Number of the recorder's steps so far, which distinguishes a stuck recorder from a slow one.
     pub(super) steps: AtomicU64,
-    /// Events for those who watch the dive; the oldest are dropped.
+    /// Events for people who watch the dive. The oldest are dropped if the queue is full.
     pub(super) events: ArrayQueue<RecordingEvent>,
-    /// Bytes that the port threads sent to the devices, which don't pass through the loop.
+    /// Bytes that port threads sent to devices. They don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
     /// Packets that the lines dropped before the loop could receive them.
     pub(super) dropped: ArrayQueue<Dropped>,
-    /// Number of dropped packets that didn't fit in `dropped`.
+    /// Number of dropped packets whose records didn't fit in `dropped`.
     pub(super) dropped_besides: AtomicU64,
-    /// Recordings of voice notes, which don't pass through the loop either.
+    /// Recordings of voice notes. They don't pass through the loop either.
     pub(super) voices: ArrayQueue<Vec<u8>>,
-    /// Whether the recorder accepts no further voice recording; set before it takes the last one.
+    /// Set when the recorder accepts no further voice recording, before it takes the last one.
     pub(super) voices_end: AtomicBool,
     pub(super) results_missing: AtomicU64,
 }
 
 impl State {
-    /// Records that the loop has handed over or skipped a tick.
+    /// Notes the time of a tick that the loop has recorded or skipped.
     pub(super) fn hand(&self, now: MonoNs) {
-        // Data from before the first tick doesn't belong to the dive's time.
+        // The dive's time begins with the first tick. Earlier data doesn't count as unsynced.
         if self.handed_ns.swap(now.0, Ordering::Relaxed) == 0 {
             self.certain_ns.fetch_max(now.0, Ordering::Relaxed);
         }
     }
 
-    /// Dive time that isn't certain to be on the medium yet.
+    /// Returns the dive time that may not be on the medium yet.
     pub(super) fn unsafe_for(&self) -> DurNs {
         let certain = MonoNs(self.certain_ns.load(Ordering::Relaxed));
         DurNs(MonoNs(self.handed_ns.load(Ordering::Relaxed)).since(certain).0.max(0))
     }
 }
 
-/// Ticks skipped by a recorder.
+/// A stretch of ticks that a recorder skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Gap {
-    /// Times of the first and last of them.
+    /// Times of the first and last skipped tick.
     pub(super) span: (MonoNs, MonoNs),
-    /// Number of packets of these ticks.
+    /// Number of packets in the skipped ticks.
     pub(super) packets: u64,
 }
 
@@ -93,19 +94,20 @@ pub(super) struct SentMessage {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Dropped {
     pub(super) source: u16,
-    /// First and last time between which they were dropped.
+    /// Times between which the packets were dropped.
     pub(super) span: (MonoNs, MonoNs),
     pub(super) packets: u64,
 }
 
-/// Logs traffic on the devices' lines that bypasses the loop, from any thread.
+/// Records line traffic that doesn't pass through the loop. Any thread may use it.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,
 }
 
 impl LinePort {
-    /// Logs bytes sent to `source`. Never blocks: when the queue is full the oldest message is dropped and counted.
+    /// Records bytes sent to `source`, without blocking. If the queue is full, the oldest message is dropped and
+    /// counted.
     pub fn sent(&self, source: u16, at: MonoNs, bytes: &[u8]) {
         let message = SentMessage { source, at, bytes: bytes.to_vec() };
         if self.state.sent.force_push(message).is_some() {
@@ -113,20 +115,20 @@ impl LinePort {
         }
     }
 
-    /// Records in the log that packets of `source` were dropped between two times. Never blocks.
+    /// Records that packets of `source` were dropped between two times, without blocking.
     pub fn lost(&self, source: u16, from: MonoNs, to: MonoNs, packets: u64) {
         if let Some(oldest) = self.state.dropped.force_push(Dropped { source, span: (from, to), packets }) {
             self.state.dropped_besides.fetch_add(oldest.packets, Ordering::Relaxed);
         }
     }
 
-    /// Number of sent messages that were dropped.
+    /// Returns the number of sent messages that were dropped.
     pub fn sent_dropped(&self) -> u64 {
         self.state.sent_dropped.load(Ordering::Relaxed)
     }
 }
 
-/// Header of a message of `len` bytes in the queue.
+/// Encodes the header of an entry whose message has `len` bytes.
 pub(super) fn entry_head(
     lane: Lane,
     log_time: MonoNs,
@@ -153,8 +155,9 @@ pub(super) struct Entries<R: ByteProducer = Prod<Arc<HeapRb<u8>>>> {
 }
 
 impl<R: ByteProducer> Entries<R> {
-    /// Reserves room for an entry with a message of `len` bytes, which must follow, and writes its header. The thread takes an
-    /// entry only once it is complete.
+    /// Reserves room for an entry with a message of `len` bytes, and writes its header.
+    ///
+    /// The message must follow. The recorder's thread takes an entry only once it is complete.
     pub(super) fn begin(
         &mut self,
         lane: Lane,
@@ -168,16 +171,16 @@ impl<R: ByteProducer> Entries<R> {
         Ok(())
     }
 
-    /// Appends the message, or a part of it.
+    /// Appends the message of an entry, or a part of it.
     pub(super) fn put(&mut self, bytes: &[u8]) {
         self.ring.push(bytes);
     }
 }
 
-/// Works until `is_stopping` returns true and nothing is left.
+/// Calls `work` until `is_stopping` returns true and no work is left.
 ///
-/// `work` returns the amount of work it found; `idle` waits briefly. The flag is read before the queue, so that
-/// everything pushed before the flag was set is processed.
+/// `work` returns the amount of work that it found, and `idle` waits briefly. The flag is read before the queue.
+/// Everything that was pushed before the flag was set is therefore processed.
 pub(super) fn until_stopped(
     is_stopping: impl Fn() -> bool,
     mut work: impl FnMut() -> usize,
@@ -196,11 +199,11 @@ pub(super) fn until_stopped(
 /// The thread's end of the queue.
 pub(super) struct Queue<R: ByteConsumer = Cons<Arc<HeapRb<u8>>>> {
     pub(super) ring: R,
-    /// The message of the entry taken last.
+    /// Message of the entry that was taken last.
     pub(super) message: Vec<u8>,
 }
 
-/// Marks the recorder as closed however it ends, so that the loop doesn't wait for it.
+/// Marks the recorder as closed on drop, however the recorder ends, so that the loop doesn't wait for it.
 pub(super) struct ClosedWhenDropped(pub(super) Arc<State>);
 
 impl Drop for ClosedWhenDropped {
@@ -217,7 +220,7 @@ pub(super) struct Entry {
 }
 
 impl<R: ByteConsumer> Queue<R> {
-    /// Takes the next entry if it is complete; its message is then in `message`.
+    /// Takes the next entry if it is complete, and puts its message into `message`.
     pub(super) fn take(&mut self) -> Option<Entry> {
         let mut head = [0; ENTRY_HEAD_BYTES];
         if self.ring.peek(&mut head) < ENTRY_HEAD_BYTES {
@@ -265,8 +268,9 @@ mod tests {
         entries.put(&message(number));
     }
 
-    /// Explores a loop that pushes two entries and sets the flag, against a recorder that takes entries until `until`
-    /// ends it.
+    /// Explores all interleavings of a loop and a recorder.
+    ///
+    /// The loop pushes two entries and sets the flag. The recorder takes entries until `until` ends it.
     fn explored<R: ByteConsumer + 'static>(
         name: &str,
         reading: fn(ModelConsumer) -> R,
@@ -303,9 +307,9 @@ mod tests {
         until_stopped(is_stopping, work, loom::thread::yield_now);
     }
 
-    /// In every interleaving of loop and recorder, entries arrive whole and in order, and none remains in the queue.
+    /// Entries arrive whole and in order, and none remains in the queue, in every interleaving of loop and recorder.
     #[test]
-    fn all_entries_are_taken_whole_before_the_stop() {
+    fn recorder_takes_all_entries_whole_before_it_stops() {
         let name = "header then body in the recorder's queue, and its stop";
         let executions = explored(name, |consumer| consumer, as_it_is);
         assert!(executions > 50, "{executions}");

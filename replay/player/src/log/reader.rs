@@ -1,4 +1,4 @@
-//! Reads logs of this program and of others, intact or damaged, one piece at a time.
+//! Reads logs of this program and of other programs, intact or damaged, one piece at a time.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -23,38 +23,38 @@ use super::scan::{FoundDefinitions, Piece, Span, beyond, date_losses, scan};
 use super::{LogError, Loss, LossKind, Many, SourceInfo};
 use crate::regular_file;
 
-/// First opcode that other programs may define. Source: MCAP format specification, "Records".
+/// First opcode that other programs may use. Source: MCAP format specification, "Records".
 const PRIVATE: u8 = 0x80;
 
 /// A log's header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LogInfo {
-    /// Text of the vehicle file, if the log has one and it is valid UTF-8.
+    /// Text of the vehicle file; `None` if the log has none, or it isn't valid UTF-8.
     pub vehicle_toml: Option<String>,
-    /// Name and content of the other attachments.
+    /// Name and content of each other attachment.
     pub attachments: Vec<(String, Vec<u8>)>,
-    /// Metadata: entries of this program's record by key, of other records by `<name of the record>/<key>`.
+    /// Metadata. Entries of this program's own record have their key, others have `<name of the record>/<key>`.
     pub metadata: BTreeMap<String, String>,
-    /// The sources; a source's index is its number in [`MessageKind`].
+    /// The sources. A source's index is its number in [`MessageKind`].
     ///
-    /// Sources are numbered by their channels' metadata if it numbers all of them, as in this program's logs. Otherwise
-    /// they are numbered by name: `/raw/...` first, then `/sent/...`.
+    /// The channels' metadata number the sources in this program's logs. If metadata don't number all of them, they
+    /// are numbered by name: `/raw/...` first, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
-    /// Position in the recording, if it has several parts.
+    /// Position of this log in a recording with several parts.
     pub part: Option<Part>,
 }
 
 /// Kind of message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MessageKind<'a> {
-    /// Bytes from a source.
+    /// Bytes received from a source.
     Raw {
-        /// The source's number.
+        /// Source number.
         source: u16,
     },
     /// Bytes sent to a source.
     Sent {
-        /// The source's number.
+        /// Source number.
         source: u16,
     },
     /// A tick of the loop, see [`super::format::Tick`].
@@ -63,69 +63,72 @@ pub enum MessageKind<'a> {
     Voice,
     /// A result of the loop.
     Result {
-        /// Its topic.
+        /// Topic of the result.
         topic: &'a str,
     },
-    /// A message of a channel that this program doesn't define.
+    /// A message of a channel that this program doesn't know.
     Other,
 }
 
 /// A message of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogMessage<'a> {
-    /// Its kind.
+    /// Kind of the message.
     pub kind: MessageKind<'a>,
-    /// Number of its channel.
+    /// Channel number.
     pub channel: u16,
-    /// Time of receipt or of creation.
+    /// Time at which the message was received or created.
     pub log_time: MonoNs,
-    /// Time of validity.
+    /// Time for which the message is valid.
     pub publish_time: MonoNs,
-    /// Its number in its channel.
+    /// Number of the message in its channel.
     pub sequence: u32,
-    /// Its content.
+    /// Content of the message.
     pub data: &'a [u8],
 }
 
-/// A position in a log, to resume reading from.
+/// A position in a log, from which reading can be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogPlace {
-    /// Pieces read so far.
+    /// Number of pieces read so far.
     read: usize,
-    /// Pieces read with messages left: piece number, and messages taken.
+    /// Pieces with messages left: piece number, and number of messages taken.
     open: Vec<(usize, usize)>,
-    /// Times of pieces already read whose chunk headers had wrong times.
+    /// True times of pieces whose chunk headers had wrong times.
     corrected: Vec<(usize, (u64, u64))>,
     latest: u64,
     late: u64,
     losses: Vec<Loss>,
     /// Message numbers of the pieces read so far.
     numbering: Option<Numbering>,
-    /// Channels defined among the messages so far.
+    /// Channels whose definitions were found among the messages so far.
     defined: Vec<Definition>,
 }
 
 /// A channel of a log, from its definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChannelInfo<'a> {
-    /// Its number.
+    /// Channel number.
     pub id: u16,
-    /// Its topic.
+    /// Topic of the channel.
     pub topic: &'a str,
     /// Message encoding; empty if unknown.
     pub encoding: &'a str,
-    /// Name of its schema, if the log contains it.
+    /// Name of the schema, if the log contains the schema.
     pub schema: Option<&'a str>,
 }
 
 /// Reads a log.
 ///
-/// Opening scans the whole file once without unpacking it. The order of messages therefore doesn't depend on a summary.
+/// Opening scans the whole file once, without unpacking it. The order of messages therefore doesn't depend on the
+/// summary.
 ///
-/// A log with a `/loop/tick` channel is read in file order. Other logs are sorted by log time, source and sequence: a
-/// piece (a chunk, or about a megabyte of messages outside chunks) is held from the time of its earliest message on,
-/// and overlapping pieces are merged. The order is exact if overlapping pieces fit into 32 MiB and chunk headers have
-/// correct times. [`LogReader::late`] counts messages out of order.
+/// A log with a `/loop/tick` channel is read in file order. Other logs are sorted by log time, source and sequence. A
+/// piece is a chunk, or about a megabyte of messages outside chunks. It is in memory from the time of its earliest
+/// message on, and overlapping pieces are merged.
+///
+/// The order is exact if overlapping pieces fit into 32 MiB and chunk headers state correct times.
+/// [`LogReader::late`] counts messages out of order.
 ///
 /// Damage is not an error: readable messages are delivered, and [`LogReader::losses`] lists the missing ones.
 pub struct LogReader<R = File> {
@@ -136,20 +139,20 @@ pub struct LogReader<R = File> {
     losses: Losses,
     /// Pieces in file order.
     spans: Vec<Span>,
-    /// Chunk header times, by piece, where those of the messages differ.
+    /// Times stated by chunk headers, by piece, where they differ from those of the messages.
     stated: BTreeMap<usize, (u64, u64)>,
     /// Piece numbers in reading order.
     plan: Vec<u32>,
-    /// Number of pieces of the plan read so far.
+    /// Number of pieces read so far, in the order of `plan`.
     read: usize,
     merge: Merge,
     by_time: bool,
     latest: u64,
     late: u64,
     finished: bool,
-    /// Message numbers of the pieces read so far; only for this program's logs read from the beginning.
+    /// Message numbers of the pieces read so far. Only for this program's logs, and only if read from the beginning.
     numbering: Option<Numbering>,
-    /// By channel, the first message number that the next log repeats.
+    /// For each channel, the number of the first message that the next part repeats.
     repeated: BTreeMap<u16, u32>,
 }
 
@@ -165,7 +168,7 @@ impl LogReader<File> {
 }
 
 impl<R: Read + Seek> LogReader<R> {
-    /// Reads a log from any input; `name` is used in messages.
+    /// Reads a log from any input. `name` is the log's name in messages.
     ///
     /// Errors: as for [`LogReader::open`].
     pub fn new(input: R, name: String) -> Result<Self, LogError> {
@@ -208,12 +211,12 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// The log's header.
+    /// Returns the log's header.
     pub fn header(&self) -> &LogInfo {
         &self.info
     }
 
-    /// Takes the attachments out of the header, so that long ones are held only once.
+    /// Moves the attachments out of the header, so that long ones aren't in memory twice.
     pub(super) fn take_attachments(&mut self) -> Vec<(String, Vec<u8>)> {
         core::mem::take(&mut self.info.attachments)
     }
@@ -228,7 +231,7 @@ impl<R: Read + Seek> LogReader<R> {
         self.channels.has(ChannelKind::Voice)
     }
 
-    /// Skips chunks that end before `at` according to their headers; call before reading the first message.
+    /// Skips chunks that end before `at`, judged by their headers. Call it before reading the first message.
     pub(super) fn pass_before(&mut self, at: MonoNs) {
         let is_due = |number: &u32| {
             self.spans.get(*number as usize).is_none_or(|span| !span.is_dated() || span.to >= at.0)
@@ -239,7 +242,7 @@ impl<R: Read + Seek> LogReader<R> {
         }
     }
 
-    /// The channels known before messages are read.
+    /// Returns the channels that are known before messages are read.
     pub fn channels(&self) -> impl Iterator<Item = ChannelInfo<'_>> {
         self.channels.all().map(|definition| {
             let (schema, encoding) =
@@ -249,48 +252,48 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// Excludes the messages after these totals; call before reading the first message.
+    /// Excludes all messages after these totals. Call it before reading the first message.
     pub(super) fn pass_over(&mut self, after: &Progress) {
         let number = |topic: &str| after.sequences.get(topic).copied().unwrap_or_default();
         self.repeated = self.channels.all().map(|channel| (channel.id, number(&channel.topic))).collect();
     }
 
-    /// First and last log time, from the chunk headers.
+    /// Returns the first and last log time, from the chunk headers.
     pub(super) fn times(&self) -> Option<(MonoNs, MonoNs)> {
         let dated = self.spans.iter().filter(|span| span.is_dated());
         let times = dated.map(|span| (MonoNs(span.from), MonoNs(span.to)));
         times.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
     }
 
-    /// Result topics of all channels read so far, in the order of channel numbers.
+    /// Returns the result topics of all channels read so far, in the order of channel numbers.
     pub(super) fn result_topics(&self) -> Vec<String> {
         self.channels.result_topics()
     }
 
-    /// Topics with several channels, with the channel numbers.
+    /// Returns the topics that have several channels, each with its channel numbers.
     pub(super) fn doubles(&self) -> Vec<(String, Vec<u16>)> {
         self.channels.doubles()
     }
 
-    /// The sources of all channels read so far.
+    /// Returns the sources of all channels read so far.
     pub(super) fn sources(&self) -> &[SourceInfo] {
         self.channels.sources()
     }
 
-    /// Damage found so far.
+    /// Returns the damage found so far.
     ///
-    /// Damage to the framing is known after opening, damage within chunks after reading them. The list is complete when
-    /// [`LogReader::next`] has returned `None`.
+    /// Damage to the framing is known after opening, damage within chunks only after reading them. The list is
+    /// complete when [`LogReader::next`] has returned `None`.
     pub fn losses(&self) -> &[Loss] {
         self.losses.list()
     }
 
-    /// Messages delivered after one with a later log time, in a log without ticks.
+    /// Returns how many messages were delivered after a message with a later log time, in a log without ticks.
     pub fn late(&self) -> u64 {
         self.late
     }
 
-    /// Advances to the next message; `false` at the end.
+    /// Reads pieces until a message is available. Returns `false` at the end.
     pub(super) fn has_next(&mut self) -> Result<bool, LogError> {
         while self.must_read() {
             self.read_piece()?;
@@ -302,9 +305,9 @@ impl<R: Read + Seek> LogReader<R> {
         Ok(found)
     }
 
-    /// The next message, or `None` at the end.
+    /// Returns the next message; `None` at the end.
     ///
-    /// Errors: an I/O error that doesn't concern particular bytes. Damage and unreadable bytes are losses, not errors.
+    /// Errors: an I/O error that doesn't concern certain bytes. Damage and unreadable bytes are losses, not errors.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -350,7 +353,7 @@ impl<R: Read + Seek> LogReader<R> {
         }
     }
 
-    /// The current position.
+    /// Returns the current position.
     pub fn place(&self) -> LogPlace {
         let times = |number: &usize| self.spans.get(*number).map(|span| (*number, (span.from, span.to)));
         LogPlace {
@@ -365,14 +368,14 @@ impl<R: Read + Seek> LogReader<R> {
         }
     }
 
-    /// Continues from a position of this or another reader of the same file.
+    /// Continues from a position of this reader, or of another reader of the same file.
     ///
-    /// Messages, their order and losses are the same as in a straight read, whatever was read in between.
+    /// Messages, their order and losses are then the same as in a straight read, whatever was read before.
     ///
     /// Errors: an I/O error.
     pub fn go_to(&mut self, place: &LogPlace) -> Result<(), LogError> {
         self.merge.clear();
-        // The times of pieces determine the reading order and the times of losses.
+        // Times of pieces are restored first, because they determine the reading order and the times of losses.
         for (number, stated) in core::mem::take(&mut self.stated) {
             self.correct(number, stated);
         }
@@ -380,20 +383,20 @@ impl<R: Read + Seek> LogReader<R> {
         for (number, times) in &place.corrected {
             self.correct(*number, *times);
         }
-        // Messages before the definition of their channel are lost, as in a straight read.
+        // Messages before the definition of their channel must be lost again, as in a straight read.
         self.channels.go_to(&place.defined);
         for (number, next) in &place.open {
             self.read_span(*number, *next)?;
         }
         (self.read, self.latest, self.late) = (place.read, place.latest, place.late);
-        // Damage after the position is found again when it is read.
+        // Damage after the position will be found again when it is read.
         self.losses = Losses::of(place.losses.clone());
         self.numbering.clone_from(&place.numbering);
         self.finished = false;
         Ok(())
     }
 
-    /// Sets the times of a piece and stores those of its header.
+    /// Sets the times of a piece, and keeps those that its header states.
     fn correct(&mut self, number: usize, times: (u64, u64)) {
         let Some(span) = self.spans.get_mut(number).filter(|span| (span.from, span.to) != times) else {
             return;
@@ -408,14 +411,14 @@ impl<R: Read + Seek> LogReader<R> {
         self.read_span(number, 0)
     }
 
-    /// Reads a piece of which `next` messages have already been taken.
+    /// Reads a piece from which `next` messages have already been taken.
     fn read_span(&mut self, number: usize, next: usize) -> Result<(), LogError> {
         let mut batch = self.merge.empty_batch();
         let mut found = Vec::new();
         let Some(span) = self.spans.get(number).copied() else { return Ok(()) };
         self.fill(&span, &mut batch, &mut found)?;
         if self.file.medium().has_failed_within(&(span.at..span.end)) {
-            // Checksums don't cover everything, so nothing of the piece is used.
+            // Checksums don't cover everything, so none of the piece's messages is used.
             batch.clear();
             found = vec![LossKind::Unreadable(self.file.medium().error().to_owned())];
         }
@@ -434,12 +437,12 @@ impl<R: Read + Seek> LogReader<R> {
         Ok(())
     }
 
-    /// Reads the messages of a piece.
+    /// Reads the messages of a piece into a batch.
     fn fill(&mut self, span: &Span, batch: &mut Batch, found: &mut Vec<LossKind>) -> Result<(), LogError> {
         match &span.chunk(&mut self.file)? {
             Some(place) => read_chunk(&mut self.file, place, batch, &mut self.channels, found)?,
             None if span.piece == Piece::Run => read_run(&mut self.file, span, batch)?,
-            // The file has changed since the scan.
+            // The file has changed since it was scanned.
             None => found.push(LossKind::Contents),
         }
         Ok(())
@@ -452,8 +455,8 @@ impl<R: Read + Seek> LogReader<R> {
             return;
         }
         if self.losses.is_full() {
-            // Only the last loss grows, and its time is determined at the end, since each search skips everything
-            // empty.
+            // A full list only extends its last loss. Its times are determined at the end, because searching for
+            // times of each loss would be slow.
             let (offset, bytes) = (span.at, span.end.saturating_sub(span.at));
             self.losses.push(Loss { kind, offset, bytes, from: None, to: None });
             return;
@@ -469,10 +472,10 @@ impl<R: Read + Seek> LogReader<R> {
         });
     }
 
-    /// Checks the checksum over the whole log at the end of a log that seems intact.
+    /// Verifies the checksum of the whole log at its end, if the log seems intact.
     ///
-    /// Only this checksum covers messages outside chunks. It isn't checked in logs with chunks, because the `mcap`
-    /// crate's writer computes it wrongly when chunk checksums are disabled.
+    /// Messages outside chunks have no other checksum. Logs with chunks are not checked, because the `mcap` crate's
+    /// writer computes this checksum wrongly when chunk checksums are disabled.
     fn finish(&mut self) -> Result<(), LogError> {
         if self.finished {
             return Ok(());
@@ -512,12 +515,12 @@ fn read_chunk<R: Read + Seek>(
     channels: &mut Channels,
     found: &mut Vec<LossKind>,
 ) -> Result<(), LogError> {
-    // Definitions count only once the chunk's checksum has been verified.
+    // Definitions are used only after the chunk's checksum has been verified.
     let (mut definitions, mut sound, mut misplaced) = (FoundDefinitions::default(), true, false);
     let unpacked = unpack(file, place, |opcode, body| match opcode {
         op::MESSAGE => sound &= batch.push(body),
         op::SCHEMA | op::CHANNEL => definitions.take(opcode, body),
-        // Readers skip records of private kinds; all other kinds belong outside chunks.
+        // Records of private kinds are skipped. Records of all other kinds belong outside chunks.
         opcode => misplaced |= opcode < PRIVATE,
     })?;
     if let Unpacked::Bad(kind) = unpacked {
@@ -563,7 +566,9 @@ fn read_run<R: Read + Seek>(file: &mut LogFile<R>, span: &Span, batch: &mut Batc
     Ok(())
 }
 
-/// Sets the ranks of messages. Removes messages of unknown channels, impossible times, and those repeated elsewhere.
+/// Sets the sort ranks of messages.
+///
+/// Removes messages of unknown channels, with impossible times, or repeated in the next part.
 fn place_entries(
     batch: &mut Batch,
     channels: &Channels,

@@ -1,7 +1,7 @@
 //! The recorder: a log writer on its own thread, behind a lock-free queue.
 //!
 //! The loop must neither wait for a disk nor lose a byte. It checks [`RecorderPort::vacant_bytes`] before it consumes
-//! more packets, and leaves packets in their ports' rings while the queue is full.
+//! packets. While the queue is full it leaves packets in the rings of their ports.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -29,13 +29,13 @@ use super::voice::VoicePort;
 use super::worker::RecorderWorker;
 use super::writer::{Lane, LogHeader, Summary};
 
-/// Sleep of the thread while the queue is empty. The loop can't wake the thread without a system call.
+/// Time that the thread sleeps while the queue is empty. Waking it earlier would cost the loop a system call.
 const NAP: Duration = Duration::from_millis(2);
-/// Minimum queue size. It fits the longest packet of a port, and a tick with many packets.
+/// Minimum size of the queue. It fits the longest packet of a port, and a tick with many packets.
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
-/// Capacity for messages to devices, enough for some seconds of eight heads.
+/// Capacity for messages to devices: some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
-/// Capacity for voice recordings. Each lasts at most a minute and takes at most 4 MiB.
+/// Capacity for voice recordings. Each lasts a minute at most, and takes 4 MiB at most.
 const VOICES: usize = 8;
 /// Time to wait at the end for a medium that neither accepts data nor fails.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -47,33 +47,33 @@ pub struct Recorder;
 
 /// The loop's end of a recorder. Its methods don't block, allocate or make system calls.
 pub struct RecorderPort {
-    /// Has no cached index, so that the port is `Sync` and can be a resource of the loop's world.
+    /// A queue end without a cached index, so that the port is `Sync` and can be a resource of the loop's world.
     entries: Entries,
     state: Arc<State>,
     result_channels: usize,
-    /// Ticks skipped since the last one that was recorded.
+    /// Ticks skipped since the last recorded tick.
     gap: Option<Gap>,
 }
 
-/// Handle to stop the recorder.
+/// Handle that ends the recorder.
 ///
-/// If dropped without [`RecorderHandle::finish`], it still completes the file, but errors are discarded.
+/// On drop, without [`RecorderHandle::finish`], the file is still completed, but errors are discarded.
 pub struct RecorderHandle {
     thread: Option<JoinHandle<Summary>>,
     state: Arc<State>,
     /// Time to wait at the end for a medium that neither accepts data nor fails.
     pub(super) patience: Duration,
-    /// Time of the request to end, and whether the waiting time is limited in total.
+    /// Time of the request to end, and whether the total wait is limited.
     ending: Option<(Instant, bool)>,
 }
 
 impl Recorder {
     /// Starts a recorder that writes to `writer`, with a queue of `queue_bytes`.
     ///
-    /// The header is written before this returns. If flushing `writer` doesn't sync to the medium, a power cut loses
-    /// more than a second. After an error the recording ends, since there is no other part to continue in.
+    /// The header is written before this function returns. If flushing `writer` doesn't sync to the medium, a power
+    /// cut loses more than a second. The recording ends after an error, because it can't continue in another part.
     ///
-    /// Errors: the header could not be written, or the thread not started.
+    /// Errors: the header can't be written, or the thread can't be started.
     pub fn start<W: Write + Send + 'static>(
         writer: W,
         header: &LogHeader,
@@ -85,14 +85,14 @@ impl Recorder {
         Self::spawn(begun)
     }
 
-    /// Starts a recorder that writes to new files on disk and syncs them every half second.
+    /// Starts a recorder that writes to new files on disk, and syncs them every half second.
     ///
-    /// It warns when the disk fills, then drops echoes before anything else: [`Summary::left_out`]. `path` names the
-    /// recording: its file or, with [`Rotation::every`], its parts, see [`super::part_path`]. After an error the
-    /// recording continues in a further part: [`Summary::faults`].
+    /// When the disk fills, the recorder warns, and then drops echoes before other messages: [`Summary::left_out`].
+    /// `path` names the recording: its file or, with [`Rotation::every`], its parts, see [`super::part_path`]. After
+    /// an error the recording continues in another part: [`Summary::faults`].
     ///
-    /// Errors: as for [`Recorder::start`]; a file can't be created; or a file exists that is this recording or looks
-    /// like a part of it. A dive is never overwritten.
+    /// Errors: as for [`Recorder::start`]; a file can't be created; the recording, or a file named like one of its
+    /// parts, exists. A dive is never overwritten.
     pub fn create(
         path: &Path,
         header: &LogHeader,
@@ -107,9 +107,9 @@ impl Recorder {
         Self::spawn(Self::unthreaded(Box::new(Disk), path, header, rotation, queue_bytes, derived)?)
     }
 
-    /// Creates a recorder without a thread, on any storage; the caller runs its steps.
+    /// Creates a recorder without a thread, on any storage. The caller runs its steps.
     ///
-    /// The header is written and synced before this returns.
+    /// The header is written and synced before this function returns.
     ///
     /// Errors: the first part can't be created, or its header can't be written.
     pub fn unthreaded(
@@ -149,9 +149,9 @@ impl Recorder {
         Ok((port, RecorderWorker::new(queue, recording, header, derived, state)))
     }
 
-    /// Runs a recorder's steps on its own thread.
+    /// Runs a recorder's steps on a thread of its own.
     ///
-    /// Errors: the thread could not be started.
+    /// Errors: the thread can't be started.
     pub(super) fn spawn(
         (port, worker): (RecorderPort, RecorderWorker),
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
@@ -162,7 +162,7 @@ impl Recorder {
     }
 }
 
-/// The recorder's thread.
+/// Main function of the recorder's thread.
 #[expect(
     clippy::disallowed_methods,
     reason = "how long a chunk stays open is wall time, and no result depends on it"
@@ -176,51 +176,53 @@ fn run(mut worker: RecorderWorker) -> Summary {
 }
 
 impl RecorderPort {
-    /// Bytes from `source`, received at `received` and valid for `valid`.
+    /// Records bytes from `source`, received at `received` and valid for `valid`.
     ///
-    /// Errors: no room; nothing was written.
+    /// Errors: there is no room; nothing was written.
     pub fn raw(&mut self, source: u16, received: MonoNs, valid: MonoNs, bytes: &[u8]) -> Result<(), Full> {
         self.push(Lane::Raw(source), received, valid, bytes)
     }
 
-    /// Bytes sent to `source`.
+    /// Records bytes sent to `source`.
     ///
-    /// Errors: no room; nothing was written.
+    /// Errors: there is no room; nothing was written.
     pub fn sent(&mut self, source: u16, at: MonoNs, bytes: &[u8]) -> Result<(), Full> {
         self.push(Lane::Sent(source), at, at, bytes)
     }
 
-    /// A tick, and the numbers of the sources in the order of consumption of their packets.
+    /// Records a tick, with the source numbers of its packets in the order of consumption.
     ///
-    /// Errors: no room; nothing was written.
+    /// Errors: there is no room; nothing was written.
     pub fn tick(&mut self, index: u64, now: MonoNs, order: &[u16]) -> Result<(), Full> {
         let len = TICK_HEAD_BYTES.saturating_add(order.len().saturating_mul(2));
         self.begin(Lane::Tick, now, now, len)?;
-        // `begin` has reserved room for the whole entry, whose length is a u32, so the count fits as well.
+        // `begin` has reserved room for the entry, whose length is a u32. The count is smaller, so it also fits into
+        // a u32.
         self.entries.put(&tick_head(index, now, u32::try_from(order.len()).unwrap_or(u32::MAX)));
         self.entries.ring.push_each(order_bytes(order));
         self.state.hand(now);
         Ok(())
     }
 
-    /// A message of result channel `channel`.
+    /// Records a message of result channel `channel`.
     ///
-    /// Errors: no room; nothing was written.
+    /// Errors: there is no room; nothing was written.
     pub fn result(&mut self, channel: u16, time: MonoNs, bytes: &[u8]) -> Result<(), Full> {
         self.push(Lane::Result(channel), time, time, bytes)
     }
 
-    /// Counts a tick whose results didn't all fit.
+    /// Counts a tick whose results didn't all fit in the queue.
     pub fn miss_results(&mut self) {
         self.state.results_missing.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Skips a tick of `packets` packets for which there is no room. The log states it; the first skip is reported as
-    /// an event.
+    /// Skips a tick of `packets` packets for which there is no room.
+    ///
+    /// The log states the skipped ticks. The first one is also reported as an event.
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
         self.state.hand(at);
         if self.gap.is_none() {
-            // If nobody reads the events, the queue is full and the event isn't needed.
+            // A full queue of events has no reader, so the event isn't needed.
             self.state.events.push(RecordingEvent::Behind).ok();
         }
         let gap = self.gap.get_or_insert(Gap { span: (at, at), packets: 0 });
@@ -228,37 +230,37 @@ impl RecorderPort {
         gap.packets += packets;
     }
 
-    /// Whether the last ticks were skipped.
+    /// Whether the last tick was skipped.
     pub fn is_behind(&self) -> bool {
         self.gap.is_some()
     }
 
-    /// Number of result channels in the log.
+    /// Returns the number of result channels in the log.
     pub fn result_channels(&self) -> usize {
         self.result_channels
     }
 
-    /// Free bytes of the queue.
+    /// Returns the free bytes of the queue.
     pub fn vacant_bytes(&self) -> usize {
         self.entries.ring.vacant_len()
     }
 
-    /// Capacity of the queue, bytes; a larger entry never fits.
+    /// Returns the capacity of the queue, bytes. A larger entry never fits.
     pub fn capacity_bytes(&self) -> usize {
         self.entries.ring.capacity().get()
     }
 
-    /// Bytes that an entry with a message of `len` bytes takes in the queue.
+    /// Returns how many bytes of the queue an entry takes whose message has `len` bytes.
     pub const fn entry_bytes(len: usize) -> usize {
         ENTRY_HEAD_BYTES.saturating_add(len)
     }
 
-    /// Bytes that the entry of a tick with `packets` packets takes in the queue.
+    /// Returns how many bytes of the queue the entry of a tick with `packets` packets takes.
     pub const fn tick_entry_bytes(packets: usize) -> usize {
         Self::entry_bytes(TICK_HEAD_BYTES.saturating_add(packets.saturating_mul(2)))
     }
 
-    /// Whether the recorder has ended and accepts nothing more.
+    /// Whether the recorder has ended, and accepts nothing more.
     pub fn is_closed(&self) -> bool {
         self.state.closed.load(Ordering::Acquire)
     }
@@ -269,7 +271,7 @@ impl RecorderPort {
         Ok(())
     }
 
-    /// Ends a stretch of skipped ticks. If there is no room to state it, it is stated with the next stretch.
+    /// Ends a stretch of skipped ticks. If there is no room to state it, it is stated together with the next stretch.
     fn end_gap(&mut self) {
         if let Some(gap) = self.gap.take() {
             self.gap = self.state.gaps.push(gap).err();
@@ -279,7 +281,7 @@ impl RecorderPort {
         }
     }
 
-    /// Begins an entry with a message of `len` bytes, after a statement of any skipped ticks.
+    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, they are stated first.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         if Self::entry_bytes(len) <= self.vacant_bytes() {
             self.end_gap();
@@ -301,31 +303,32 @@ impl RecorderHandle {
         self.state.failing.load(Ordering::Acquire)
     }
 
-    /// The next event of the recording, oldest first; each is returned once.
+    /// Returns the oldest event of the recording that has not been returned yet.
     pub fn next_event(&self) -> Option<RecordingEvent> {
         self.state.events.pop()
     }
 
-    /// Dive time that a power cut would lose now: from the last synced message to the last tick.
+    /// Returns the dive time that a power cut would lose now: from the last synced message to the last tick.
     ///
     /// Messages given up after an error count as synced.
     pub fn unsafe_for(&self) -> DurNs {
         self.state.unsafe_for()
     }
 
-    /// A port for traffic on devices' lines that bypasses the loop.
+    /// Returns a port for line traffic that doesn't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }
 
-    /// A port for the recordings of voice notes.
+    /// Returns a port for recordings of voice notes.
     pub fn voice_port(&self) -> VoicePort {
         VoicePort { state: Arc::clone(&self.state) }
     }
 
-    /// Tells the thread to end without waiting for it, so that several recorders end in the time of the slowest.
+    /// Tells the thread to end, without waiting for it. Several recorders can then end at the same time.
     ///
-    /// With `in_time` the total wait is 30 s; otherwise waiting continues while there is progress.
+    /// If `in_time` is true, the later wait takes 30 s at most in total. Otherwise it continues while there is
+    /// progress.
     #[expect(clippy::disallowed_methods, reason = "how long a medium is waited for is wall time")]
     pub fn begin_to_end(&mut self, in_time: bool) {
         self.ending.get_or_insert((Instant::now(), in_time));
@@ -353,7 +356,7 @@ impl RecorderHandle {
             if now != steps && !in_time {
                 (steps, since) = (now, Instant::now());
             } else if since.elapsed() > self.patience {
-                // A thread that waits for its medium can't be stopped; it ends with the program.
+                // A thread that waits for its medium can't be stopped. It ends together with the program.
                 return Some(Err(LogError::Stuck { waited_s: self.patience.as_secs() }));
             }
             thread::sleep(NAP);

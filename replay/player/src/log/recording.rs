@@ -1,10 +1,10 @@
-//! A recording in its parts.
+//! A recording with its parts.
 //!
 //! A part that can't be written any more is left without an end. Another part is begun, and messages that may be
-//! missing from the last one are written again.
+//! missing from the previous part are written again.
 //!
-//! After an error, nothing written since the last sync is reliable: a file system may discard it and report success the
-//! next time. Messages are therefore kept in memory until they are synced.
+//! After an error, nothing written since the last sync is reliable: a file system may discard it and report success
+//! the next time. Messages are therefore kept in memory until they are synced.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -22,65 +22,66 @@ use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 
 /// Unsynced bytes after which a sync is due.
 const SYNC_BYTES: usize = 4 << 20;
-/// Wait after the second failed attempt to continue; doubled after each further one. The first retry is immediate.
+/// Wait after the second failed attempt to continue. It doubles after each further attempt. The first retry is
+/// immediate.
 const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
-/// Attempts to write the rest after the dive has ended.
+/// Number of attempts to write the rest after the dive has ended.
 const LAST_ATTEMPTS: u32 = 3;
-/// Maximum number of statements kept for a part that can't be begun yet.
+/// Maximum number of statements kept while no part can be begun.
 const MAX_STATEMENTS: usize = 100;
-/// Number of names tried for a part if files with these names exist.
+/// Maximum number of names tried for a part, if files with these names exist.
 const NAMES: u32 = 1000;
 
 /// The part being written.
 struct OpenPart {
     path: PathBuf,
     log: LogWriter<Buffered>,
-    /// Log time of its first message, or of the last failed rotation.
+    /// Log time of the part's first message, or of the last failed rotation.
     began: Option<MonoNs>,
     /// File size at which the part should end, bytes.
     ends_at: u64,
-    /// Whether only its header is synced.
+    /// Whether only the part's header is synced.
     fresh: bool,
-    /// Number of synced messages from sources.
+    /// Number of synced messages from sources in this part.
     raw_messages: u64,
-    /// Number of synced messages, and their bytes.
+    /// Number of synced messages in this part, and their bytes.
     certain: (u64, u64),
-    /// Log time of the last message before it.
+    /// Log time of the last message before this part.
     before: Option<MonoNs>,
 }
 
-/// A period without a part that can be written.
+/// An interruption, during which no part can be written.
 struct Outage {
     fault: RecordingFault,
     retry_at: Duration,
     wait: Duration,
 }
 
-/// A statement of a loss: after, before, words.
+/// A statement of a loss: time before it, time after it, and text.
 type Statement = (Option<MonoNs>, Option<MonoNs>, String);
 
-/// A recording.
+/// A recording in one or several parts.
 pub(super) struct Recording {
     storage: Box<dyn Storage>,
     path: PathBuf,
     rotation: Rotation,
-    /// Header of every part; `part` is set for each part.
+    /// Header of all parts. Its field `part` is set separately for each part.
     header: LogHeader,
     open: Option<OpenPart>,
-    /// Number of the last part with any content.
+    /// Number of the last part that has any content.
     number: u32,
-    /// Number in the name of the last part.
+    /// Number in the file name of the last part.
     named: u32,
-    /// Totals of messages that are synced or lost: everything before the backlog.
+    /// Totals of all messages that are synced or lost, which are all messages before the backlog.
     settled: Tally,
     backlog: Backlog,
-    /// Statements that aren't synced yet.
+    /// Statements of losses that aren't synced yet.
     statements: Vec<Statement>,
-    /// Whether packets have been written whose tick hasn't been written yet.
+    /// Whether packets have been written, but not yet the tick that consumed them.
     within_tick: bool,
     outage: Option<Outage>,
-    /// Number of messages for channels that the header doesn't have, and the first of these channels.
+    /// Number of messages for channels that are missing from the header, and the first such channel.
     refused: Option<(u64, Lane)>,
     sum: Summary,
     events: Vec<RecordingEvent>,
@@ -88,9 +89,9 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// Begins the first part.
+    /// Begins a recording with its first part.
     ///
-    /// Errors: it can't be created or written.
+    /// Errors: the part can't be created or written.
     pub(super) fn begin(
         storage: Box<dyn Storage>,
         path: &Path,
@@ -120,27 +121,27 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Bytes free on its medium, where known.
+    /// Returns the free bytes of the recording's medium; `None` if unknown.
     pub(super) fn free_bytes(&mut self) -> Option<u64> {
         self.storage.free_bytes(&self.path)
     }
 
-    /// Log time of the last message that is synced or given up.
+    /// Returns the log time of the last message that is synced or given up.
     pub(super) fn certain_to(&self) -> Option<MonoNs> {
         self.settled.last
     }
 
-    /// Whether nothing is being recorded at present.
+    /// Whether nothing is being recorded at present, because of an error.
     pub(super) fn is_failing(&self) -> bool {
         self.open.is_none()
     }
 
-    /// Events since the last call.
+    /// Returns the events since the last call.
     pub(super) fn take_events(&mut self) -> Vec<RecordingEvent> {
         core::mem::take(&mut self.events)
     }
 
-    /// Sets the time since the recording began, and retries with another part if that is due.
+    /// Sets the time since the recording began. Tries to begin another part if a retry is due.
     pub(super) fn look(&mut self, now: Duration) {
         self.now = now;
         if self.open.is_none() && self.outage.as_ref().is_some_and(|outage| now >= outage.retry_at) {
@@ -170,7 +171,7 @@ impl Recording {
         }
     }
 
-    /// Counts a message as lost.
+    /// Counts a message that is lost.
     fn lose(&mut self, lost: &Head) {
         self.settled.add(lost);
         if let Some(outage) = &mut self.outage {
@@ -178,7 +179,7 @@ impl Recording {
         }
     }
 
-    /// States a loss in the log.
+    /// Writes a statement of a loss to the log.
     pub(super) fn state(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) {
         if self.statements.len() < MAX_STATEMENTS {
             self.statements.push((from, to, words.to_owned()));
@@ -199,7 +200,7 @@ impl Recording {
         }
     }
 
-    /// Marks everything in the open part as synced.
+    /// Marks all messages of the open part as synced.
     fn settle(&mut self) {
         let Some(part) = &mut self.open else { return };
         while let Some(head) = self.backlog.pop() {
@@ -213,7 +214,7 @@ impl Recording {
         part.fresh = false;
     }
 
-    /// Abandons the open part, without an end.
+    /// Gives up the open part, and leaves it without an end.
     fn fail(&mut self, error: &LogError) {
         let Some(part) = self.open.take() else { return };
         let OpenPart { path, log, fresh, raw_messages, certain, before, .. } = part;
@@ -221,9 +222,9 @@ impl Recording {
         drop(log);
         let is_taken = matches!(error, LogError::Write { source, .. } if Taken::is_in(source));
         let (mut lost, mut from) = (0, self.settled.last);
-        // A part without synced content is removed, except the first, which has the recording's name.
+        // A part without synced content is removed. The first part is kept, because it has the recording's name.
         if is_taken {
-            // A deleted file is no part either. A file now at its path belongs to another program.
+            // A deleted file isn't a part either. A file that is now at its path belongs to another program.
             (lost, from) = (certain.0, before);
             self.sum.messages -= certain.0;
             self.sum.message_bytes -= certain.1;
@@ -253,7 +254,7 @@ impl Recording {
         }
     }
 
-    /// Begins another part after an error, and writes the unsynced messages into it.
+    /// Begins another part after an error, and writes the unsynced messages to it.
     fn resume(&mut self) {
         let part = match self.begin_part() {
             Ok(part) => part,
@@ -268,7 +269,7 @@ impl Recording {
         self.open = Some(part);
         if let Err(error) = self.write_again(&path) {
             self.fail(&error);
-            // A voice recording is as large as seconds of a dive, which may fit without it.
+            // A voice recording is as large as several seconds of a dive. Without it the other messages may fit.
             for lost in self.backlog.drop_voices() {
                 self.lose(&lost);
             }
@@ -282,7 +283,7 @@ impl Recording {
         add(&mut self.sum.faults, fault);
     }
 
-    /// Writes the statements and the backlog into the newly begun part, and syncs it.
+    /// Writes the statements and the backlog to the part just begun, and syncs it.
     fn write_again(&mut self, path: &Path) -> Result<(), LogError> {
         let Some(part) = &mut self.open else { return Ok(()) };
         if let Some(outage) = &mut self.outage {
@@ -299,9 +300,9 @@ impl Recording {
         log.flush()
     }
 
-    /// Whether the part should end before a message.
+    /// Whether the part should end before this message.
     fn is_due(&mut self, lane: Lane, at: MonoNs) -> bool {
-        // Parts end between ticks, so that each contains whole ticks.
+        // A part ends only between two ticks, so that no tick is split.
         let between = match lane {
             Lane::Raw(_) => !core::mem::replace(&mut self.within_tick, true),
             Lane::Tick => {
@@ -320,7 +321,9 @@ impl Recording {
             }
     }
 
-    /// Ends the part and begins the next, whose first message has time `at`. If that fails, the last part continues.
+    /// Ends the part and begins the next one, whose first message has time `at`.
+    ///
+    /// If the next part can't be begun, the last part continues.
     fn rotate(&mut self, at: MonoNs) {
         self.sync();
         if self.open.is_none() {
@@ -347,7 +350,7 @@ impl Recording {
         }
     }
 
-    /// Creates the file of the next part, and writes and syncs its header.
+    /// Creates the file of the next part, writes its header and syncs it.
     fn begin_part(&mut self) -> Result<OpenPart, LogError> {
         let before = self.settled.progress(&self.header);
         let part = PartHead { dive: self.rotation.dive.clone(), number: self.number + 1, before };
@@ -374,14 +377,14 @@ impl Recording {
                 })
             }
             Err(error) => {
-                // A file without a header is no part.
+                // A file without a header isn't a part.
                 self.discard(&path);
                 Err(error)
             }
         }
     }
 
-    /// Creates the next file. A part other than the first skips existing names.
+    /// Creates the next file. Existing names are skipped, except for the first part.
     fn create(&mut self) -> Result<(PathBuf, Box<dyn super::storage::StoredFile>), LogError> {
         let first = self.named + 1;
         for name in first..first.saturating_add(NAMES) {
@@ -400,7 +403,7 @@ impl Recording {
         Err(LogError::Create { path, source: ErrorKind::AlreadyExists.into() })
     }
 
-    /// Removes the file of the part created last; if that fails, its name is skipped.
+    /// Removes the file created last. If that fails, the next part skips its name.
     fn discard(&mut self, path: &Path) {
         match self.storage.remove(path) {
             Ok(()) => self.named = self.named.saturating_sub(1),
@@ -408,7 +411,7 @@ impl Recording {
         }
     }
 
-    /// Ends a part whose messages are synced, and adds it to the totals.
+    /// Ends a part whose messages are synced, and adds the part to the totals.
     fn end(&mut self, part: OpenPart, follows: bool) {
         let OpenPart { path, mut log, raw_messages, .. } = part;
         let bytes = log.bytes();
@@ -436,7 +439,7 @@ impl Recording {
         self.sum.parts.push(PartSummary { path, raw_messages });
     }
 
-    /// Ends the recording; returns its totals.
+    /// Ends the recording, and returns its totals.
     pub(super) fn finish(mut self) -> Summary {
         for _ in 0..LAST_ATTEMPTS {
             if self.open.is_none() {

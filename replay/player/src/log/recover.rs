@@ -12,26 +12,27 @@ use super::{
     SourceInfo,
 };
 
-/// Metadata key of a recovered log: the log it was made from.
+/// Metadata key of a recovered log. Its value is the name of the original log.
 pub const RECOVERED_FROM: &str = "recovered_from";
 
-/// Outcome of a recovery.
+/// Result of a recovery.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recovered {
-    /// Messages written.
+    /// Number of messages written.
     pub messages: u64,
-    /// Log times of the first and last of them, in log order.
+    /// Log times of the first and last message written, in log order.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// Losses, as also stated in the recovered log.
+    /// Losses, which the recovered log states too.
     pub losses: Vec<Loss>,
 }
 
-/// Writes the readable content of a log to `output`, in the same order: attachments, metadata, device messages, ticks
-/// and results.
+/// Writes the readable content of a log to `output`, in the same order.
 ///
-/// The new log replays to the same digest and states its losses. Parts of a recording become one log; a single part
-/// remains a part. `open` opens the log; it is called twice, first to find all damage. `known` are the result channels
-/// whose schemas this program has; `from` is the name of the source log.
+/// The content is attachments, metadata, device messages, ticks and results. The new log replays to the same digest,
+/// and states its losses. All parts of a recording become one log; a single part remains a part.
+///
+/// `open` opens the log; it is called twice, first to find all damage. `known` are the result channels whose schemas
+/// this program has. `from` is the name of the original log.
 ///
 /// Errors: the log can't be read, or the output can't be written.
 pub fn recover<R: Read + Seek, W: Write>(
@@ -63,9 +64,9 @@ pub fn recover<R: Read + Seek, W: Write>(
     Ok(done)
 }
 
-/// Facts about a log that has been read completely.
+/// Facts about a log that has been read to its end.
 pub(super) struct Found {
-    /// All losses, including content without a channel in dive logs.
+    /// All losses, including content that dive logs have no channel for.
     pub(super) losses: Vec<Loss>,
     pub(super) topics: Vec<String>,
     pub(super) sources: Vec<SourceInfo>,
@@ -120,7 +121,7 @@ pub(super) fn header<R: Read + Seek>(
     }
 }
 
-/// The channel of the new log for a message; `None` if dive logs have no such channel.
+/// Returns the channel of the new log for a message; `None` if dive logs have no such channel.
 pub(super) fn lane(message: &LogMessage<'_>, results: &BTreeMap<&str, u16>) -> Option<Lane> {
     match message.kind {
         MessageKind::Raw { source } => Some(Lane::Raw(source)),

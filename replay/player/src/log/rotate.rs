@@ -1,4 +1,4 @@
-//! Splitting a recording into parts, and finding the files of its parts.
+//! Splits a recording into parts, and finds the files of its parts.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -16,23 +16,23 @@ use crate::atomic_file::folder_of;
 /// Condition under which a part of a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Every {
-    /// The file has this many bytes; the second in which it reaches them still belongs to the part.
+    /// The file reaches this many bytes. The second in which it reaches them still belongs to the part.
     Bytes(u64),
-    /// The messages span this much dive time.
+    /// The messages reach this span of dive time.
     Span(DurNs),
 }
 
 /// How a recording is split into parts.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Rotation {
-    /// Condition under which a part ends; `None` for a single file, which continues in a second part only after an
+    /// Condition under which a part ends; `None` for a single file, which is continued in another part only after an
     /// error.
     pub every: Option<Every>,
     /// Unique identifier of the recording, see [`super::dive_name`].
     pub dive: String,
 }
 
-/// The existing files that look like this recording or a part of it.
+/// Returns existing files that are this recording, or are named like one of its parts.
 ///
 /// Errors: the folder can't be read.
 pub fn in_the_way(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
@@ -41,7 +41,7 @@ pub fn in_the_way(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// The files beside a recording that are named as its parts, in order.
+/// Returns the files beside a recording that are named like its parts, in order.
 pub(super) fn parts_of(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut parts = Vec::new();
     for entry in std::fs::read_dir(folder_of(recording))? {
@@ -58,12 +58,12 @@ pub(super) fn parts_of(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(parts.into_iter().map(|(_, path)| path).collect())
 }
 
-/// The log files for paths named by the user.
+/// Returns the log files for paths that the user named.
 ///
-/// A path is a log, with the parts in which its recording continued after an error; a folder of logs; or the given name
-/// of a recording in parts. A file that is named twice, or both alone and as a part, occurs once.
+/// A path may be a log, a folder of logs, or the given name of a recording in parts. Parts in which a log continues
+/// after an error are included. A file occurs only once, even if it is named twice or is also a part.
 ///
-/// Errors: a folder can't be read or contains no log.
+/// Errors: a folder can't be read, or contains no log.
 pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
     let mut files: Vec<PathBuf> = Vec::new();
     for path in named {
@@ -82,7 +82,7 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
             files.push(path.clone());
             files.extend(continuations(path));
         } else {
-            // Without parts, opening the log reports that it doesn't exist.
+            // If there are no parts either, opening the log reports that it doesn't exist.
             let parts = parts_of(path).unwrap_or_default();
             files.extend(if parts.is_empty() { vec![path.clone()] } else { parts });
         }
@@ -92,14 +92,14 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
     Ok(files)
 }
 
-/// The further parts of a recording whose first part is at `path`.
+/// Returns the further parts of a recording whose first part is at `path`.
 fn continuations(path: &Path) -> Vec<PathBuf> {
     let mut parts = parts_of(path).unwrap_or_default();
     if parts.is_empty() {
         return parts;
     }
     let Some(first) = part_head(path).filter(|head| head.number == 1) else { return Vec::new() };
-    // A part without a head was being created when the power failed.
+    // A part without a header was being created when the power failed. It belongs to the recording by its name.
     parts.retain(|part| part_head(part).is_none_or(|head| head.dive == first.dive));
     parts
 }
@@ -109,7 +109,7 @@ const HEAD_RECORDS: usize = 4;
 /// Longest record that is read for the part metadata, bytes.
 const MAX_HEAD_BYTES: u64 = 1 << 20;
 
-/// The part metadata of a log; `None` if it has none.
+/// Returns the part metadata of a log; `None` if it has none.
 fn part_head(path: &Path) -> Option<PartHead> {
     let mut file = LogFile::new(File::open(path).ok()?, path.display().to_string()).ok()?;
     let mut at = mcap::MAGIC.len() as u64;

@@ -1,7 +1,7 @@
 //! Scans a whole log before it is read.
 //!
-//! Finds positions and times of chunks, channels, attachments, metadata, and damage. Chunk data is skipped, so the scan
-//! is quick.
+//! The scan finds the positions and times of chunks, channels, attachments, metadata and damage. It skips the data of
+//! chunks, so it is quick.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -24,19 +24,19 @@ use super::loss::Losses;
 use super::search::find_records;
 use super::{LogError, Loss, LossKind, Many};
 
-/// Messages outside chunks are read in pieces of about this size, bytes.
+/// Approximate size of a piece of messages outside chunks, bytes.
 const RUN_BYTES: u64 = 1 << 20;
 
-/// A unit of reading.
+/// Kind of piece. A piece is the unit in which a log is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Piece {
-    /// A chunk. Its header is read again when needed: a long dive has a hundred thousand chunks of half a second each.
+    /// A chunk. Its header is read again when needed, because a long dive has a hundred thousand chunks.
     Chunk,
-    /// A run of messages outside chunks, with records of other kinds between them.
+    /// A run of messages outside chunks. Records of other kinds may be between them.
     Run,
 }
 
-/// A piece with its byte range and time span.
+/// A piece, with its range of bytes and its time span.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Span {
     pub(super) at: u64,
@@ -53,43 +53,44 @@ pub(super) struct Scan {
     pub(super) losses: Losses,
     pub(super) attachments: Vec<(String, Vec<u8>)>,
     pub(super) metadata: BTreeMap<String, String>,
-    /// Names of schemas by their numbers.
+    /// Names of schemas by schema number.
     pub(super) schemas: BTreeMap<u16, String>,
     definitions: BTreeMap<u16, Definition>,
-    /// Definitions in the summary; they count only if its checksum matches.
+    /// Definitions in the summary. They are used only if the summary's checksum matches.
     summary: BTreeMap<u16, Definition>,
-    /// Messages and channels of the log according to its summary.
+    /// Number of messages and of channels that the summary states.
     summary_counts: Option<(u64, u32)>,
-    /// Number of messages according to a summary with a matching checksum.
+    /// Number of messages stated by a summary whose checksum matches.
     pub(super) messages: Option<u64>,
     data_end: Option<core::ops::Range<u64>>,
-    /// Whether this program wrote the log. Such logs have no messages outside chunks, numbered messages and a summary.
+    /// Whether this program wrote the log. Such a log has all messages in chunks, numbers its messages, and has a
+    /// summary.
     pub(super) ours: bool,
-    /// Whether the log has the record that repeats its channels.
+    /// Whether the log has the record that repeats the channel definitions.
     has_list: bool,
-    /// Attachments listed by a log of this program.
+    /// Names of attachments that a log of this program lists.
     announced: Vec<String>,
-    /// Losses stated by the log itself.
+    /// Losses that the log itself states.
     stated: Vec<Loss>,
-    /// The footer's range and the summary start that it states, if the last record was a footer.
+    /// Range of the footer, and the start of the summary that it states, if the last record was a footer.
     footer: Option<(core::ops::Range<u64>, u64)>,
-    /// Whether the next message may be appended to the last run.
+    /// Whether the next message may be added to the last run.
     run_open: bool,
     attachment_bytes: u64,
-    /// Bytes that the chunks unpack to.
+    /// Number of bytes that the chunks so far unpack to.
     unpacked: u64,
     budget: HeaderBudget,
 }
 
 /// Scans a log.
 ///
-/// Errors: not MCAP, of a later format, or an I/O error.
+/// Errors: the file isn't MCAP, has a later format, or can't be read.
 pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Channels), LogError> {
     let mut scan = Scan::default();
     let magic_len = mcap::MAGIC.len() as u64;
     let first = file.bytes_at(0, magic_len)?;
     if first != mcap::MAGIC {
-        // A log whose first bytes are damaged still has its header record after them.
+        // If only the first bytes of a log are damaged, its header record still follows them.
         if !matches!(look(file, magic_len)?, Found::Record(Frame { item: Item::Header { .. }, .. })) {
             let unread = file.medium().has_failed_within(&(0..magic_len)).then(|| unread(file));
             return Err(unread.unwrap_or_else(|| not_mcap(file, &first)));
@@ -118,7 +119,7 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     Ok((scan, channels))
 }
 
-/// The loss for exceeding a limit.
+/// Returns the loss for exceeding a limit.
 pub(super) fn beyond(what: Many) -> LossKind {
     let limit = match what {
         Many::Pieces => MAX_PIECES as u64,
@@ -130,7 +131,7 @@ pub(super) fn beyond(what: Many) -> LossKind {
     LossKind::Beyond { what, limit }
 }
 
-/// The error for a log whose beginning can't be read.
+/// Returns the error for a log whose beginning can't be read.
 fn unread<R: Read + Seek>(file: &LogFile<R>) -> LogError {
     let source = std::io::Error::other(file.medium().error().to_owned());
     LogError::Read { name: file.name().to_owned(), offset: 0, source }
@@ -145,7 +146,7 @@ impl Scan {
     fn walk<R: Read + Seek>(&mut self, file: &mut LogFile<R>, start: u64) -> Result<(), LogError> {
         let (mut at, mut found) = (start, look(file, start)?);
         loop {
-            // Position to continue from after damage.
+            // Position at which the scan continues after damage.
             let resumed = match found {
                 Found::Closing => {
                     let end = at + mcap::MAGIC.len() as u64;
@@ -190,7 +191,7 @@ impl Scan {
     }
 
     fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
-        // Nothing follows a footer, so that footer was a damaged record of another kind.
+        // A footer is the last record. Another record follows, so the footer was a damaged record of another kind.
         if let Some((footer, _)) = self.footer.take() {
             self.lose(LossKind::Framing, footer);
         }
@@ -200,7 +201,7 @@ impl Scan {
             Item::Chunk(place) => self.add_chunk(frame.at, frame.end, place),
             Item::Channel => self.add_channel(file, frame)?,
             Item::Schema => {
-                // The content isn't kept and may be long.
+                // The content of a schema isn't kept and may be long, so only the beginning is read.
                 let body = file.bytes_at(frame.body, (frame.end - frame.body).min(MAX_HEADER_BYTES))?;
                 let schema = schema(&mut Fields::new(&body));
                 if let Some((number, name)) = schema.filter(|(number, _)| !self.schemas.contains_key(number))
@@ -238,7 +239,7 @@ impl Scan {
             self.lose(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES }, frame.at..frame.end);
             return;
         }
-        // The length of a run includes records between its messages.
+        // The length of a run includes other records between its messages.
         let within = |last: &&mut Span| self.run_open && frame.end - last.at <= RUN_BYTES;
         let last = self.spans.last_mut().filter(within);
         if let Some(run) = last {
@@ -249,7 +250,7 @@ impl Scan {
         }
     }
 
-    /// Adds a piece; `false` if there are too many.
+    /// Adds a piece. Returns `false` if there are too many.
     fn add_span(&mut self, span: Span) -> bool {
         let fits = self.spans.len() < MAX_PIECES;
         if fits {
@@ -262,7 +263,7 @@ impl Scan {
 
     fn add_chunk(&mut self, at: u64, end: u64, place: &ChunkPlace) {
         let (from, to) = place.times;
-        // Chunks over the limit aren't unpacked, nor is a truncated chunk unpacked beyond its records.
+        // Only chunks that will be unpacked as a whole count: not chunks over the limit, and not truncated chunks.
         if !place.compression.is_empty() && !place.cut && place.unpacked_len <= MAX_UNPACKED_BYTES {
             let unpacked = self.unpacked.saturating_add(place.unpacked_len);
             if unpacked > unpacked_limit(end) {
@@ -306,7 +307,7 @@ impl Scan {
             self.lose(LossKind::Framing, frame.at..frame.end);
             return Ok(());
         };
-        // Each entry is stored with the record's name.
+        // Each entry is stored together with the record's name, which takes memory too.
         let names = cost / map_cost(1, 0) * name.len() as u64;
         if !self.budget.take(cost.saturating_add(names)) {
             self.lose_beyond(Many::HeaderBytes, frame.at..frame.end);
@@ -350,8 +351,8 @@ impl Scan {
         }
         self.attachment_bytes = used;
         let body = file.bytes_at(frame.body, place.head_len + place.data_len + 4)?;
-        // The `mcap` crate's parser checks the checksum. It requires consistent lengths, which the framing has
-        // verified.
+        // The `mcap` crate's parser verifies the checksum. It requires consistent lengths, which the framing has
+        // checked.
         match mcap::parse_record(op::ATTACHMENT, &body) {
             Ok(mcap::records::Record::Attachment { data, .. }) => {
                 self.attachments.push((place.name.clone(), data.into_owned()));
@@ -361,17 +362,18 @@ impl Scan {
         Ok(())
     }
 
-    /// Checks the end of the log for missing whole records, which leave no gap in the framing.
+    /// Checks whether whole records are missing, which leaves no gap in the framing.
     ///
-    /// If the end of the file is lost, the closing records are missing. If records are lost elsewhere, the summary
-    /// isn't where the footer says.
+    /// If the end of the file is lost, the closing records are missing. If other records are lost, the summary isn't
+    /// where the footer says.
     fn check_closing(&mut self, at: u64) {
         let (Some((_, summary)), Some(data_end)) = (self.footer.take(), self.data_end.clone()) else {
             self.lose(LossKind::Truncated, at..at);
             return;
         };
         if summary == 0 && self.ours {
-            // This program always writes a summary; its absence means that the last messages were removed with it.
+            // This program always writes a summary. If there is none, the last messages were removed together with
+            // it.
             self.lose(LossKind::Truncated, at..at);
         }
         if summary != 0 && summary != data_end.end && self.losses.list().is_empty() {
@@ -387,9 +389,9 @@ impl Scan {
         Err(LogError::TooNew { name: file.name().to_owned(), found: found.clone(), known: FORMAT_VERSION })
     }
 
-    /// Prefers the channels of an intact summary to all others; returns whether these are all channels.
+    /// Uses the channels of an intact summary in place of all others. Returns whether the summary lists all channels.
     ///
-    /// A tool that copied a log of this program may have renumbered them.
+    /// A tool that copied a log of this program may have renumbered its channels.
     fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<bool, LogError> {
         let Some(data_end) = self.data_end.as_ref().map(|record| record.start) else { return Ok(false) };
         if self.summary.is_empty() || !summary_holds(file, data_end)? {
@@ -401,14 +403,15 @@ impl Scan {
         Ok(all)
     }
 
-    /// Whether a channel's schema hasn't been found yet.
+    /// Whether the schema of any channel hasn't been found yet.
     fn lacks_schemas(&self) -> bool {
         let numbers = self.definitions.values().filter_map(|definition| definition.form.as_ref());
         numbers.map(|(schema, _)| *schema).any(|schema| schema > 0 && !self.schemas.contains_key(&schema))
     }
 
-    /// Reads all chunks for channel definitions, for truncated logs of other writers. Definitions in intact chunks take
-    /// precedence over those outside chunks.
+    /// Searches all chunks for channel definitions, which truncated logs of other writers need.
+    ///
+    /// Definitions in intact chunks take precedence over those outside chunks.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for number in 0..self.spans.len() {
             let Some(span) = self.spans.get(number).copied() else { break };
@@ -431,7 +434,7 @@ impl Scan {
         Ok(())
     }
 
-    /// Adds a definition found in a chunk; one from an intact chunk replaces a known one.
+    /// Adds a definition found in a chunk. A definition from an intact chunk replaces a known one.
     fn add_found(&mut self, definition: Definition, whole: bool, part: core::ops::Range<u64>) {
         let known = self.definitions.get(&definition.id);
         if known.is_some_and(|known| !whole || *known == definition) {
@@ -445,7 +448,7 @@ impl Scan {
         }
     }
 
-    /// Reports expected records missing from a log of this program, if no other loss has been found.
+    /// Reports missing records that a log of this program must have, if no other loss has been found.
     fn miss_parts(&mut self) {
         if !self.ours || !self.losses.list().is_empty() {
             return;
@@ -476,15 +479,16 @@ impl Scan {
     }
 }
 
-/// Sets the time spans of losses from the pieces around them.
+/// Sets the times of losses from the pieces around them.
 ///
-/// Chunk headers may have wrong times. Once all pieces are `read`, the times are those of their messages.
+/// If `read` is true, all pieces have been read, and their times are those of their messages. Before that, the times
+/// come from chunk headers, which may be wrong.
 pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
     for loss in losses.list_mut().iter_mut().filter(|loss| !matches!(loss.kind, LossKind::Stated(_))) {
         let next = spans.partition_point(|span| span.at < loss.offset);
         let end = loss.offset.saturating_add(loss.bytes.max(1));
         let after = spans.iter().skip(next).find(|span| span.at >= end && span.is_dated());
-        // A chunk cut off by the end of the file may have delivered messages; the loss begins after them.
+        // The file may end within a chunk that has delivered messages. The loss begins after these messages.
         let cut = usize::from(read && loss.kind == LossKind::Truncated);
         let cut = spans.get(next..).and_then(|rest| rest.get(..cut)).unwrap_or_default();
         let before = spans.iter().take(next).chain(cut).rev().find(|span| span.is_dated());
@@ -492,9 +496,9 @@ pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
     }
 }
 
-/// Whether a record's length is trusted: its fields confirm it, or another record follows.
+/// Whether a record's length is trusted: the record's fields confirm it, or another record follows.
 ///
-/// If the end of the file cuts off the following record, the length is wrong if there are records within it.
+/// If the end of the file cuts off the following record, the length is trusted only if no records lie within it.
 fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Found) -> Result<bool, LogError> {
     let followed = !matches!(next, Found::Nothing);
     Ok(match next {
@@ -507,7 +511,7 @@ fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Foun
 }
 
 impl Span {
-    /// The chunk, read from its header; `None` for a run.
+    /// Reads the chunk's header; `None` for a run of messages outside chunks.
     pub(super) fn chunk<R: Read + Seek>(
         &self,
         file: &mut LogFile<R>,
@@ -522,19 +526,19 @@ impl Span {
         })
     }
 
-    /// Whether its times are valid. A chunk without messages has no times.
+    /// Whether the times are valid. A chunk without messages has no times.
     pub(super) fn is_dated(&self) -> bool {
         (self.from, self.to) != (0, 0)
     }
 }
 
-/// Definitions in a chunk, up to the memory limit for all definitions of a log.
+/// Definitions found in a chunk, up to the memory limit for all definitions of a log.
 #[derive(Default)]
 pub(super) struct FoundDefinitions {
     pub(super) channels: Vec<Definition>,
     pub(super) schemas: Vec<(u16, String)>,
     budget: HeaderBudget,
-    /// Whether the limit was exceeded.
+    /// Whether definitions were dropped because of the limit.
     pub(super) beyond: bool,
 }
 
@@ -559,7 +563,7 @@ impl FoundDefinitions {
     }
 }
 
-/// The whole body of a record; `None` if it is too long to be read.
+/// Reads the whole body of a record; `None` if it is longer than allowed.
 fn whole_body<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame) -> Result<Option<Vec<u8>>, LogError> {
     let len = frame.end - frame.body;
     if len > MAX_HEADER_BYTES { Ok(None) } else { file.bytes_at(frame.body, len).map(Some) }

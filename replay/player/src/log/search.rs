@@ -1,4 +1,4 @@
-//! Searches byte by byte for records after damage, until several records follow each other.
+//! Searches byte by byte for records after damage.
 
 use std::io::{Read, Seek};
 
@@ -7,15 +7,15 @@ use mcap::records::op;
 use super::LogError;
 use super::framing::{Found, Item, LogFile, look};
 
-/// Number of consecutive records needed to accept a position.
+/// Number of consecutive records after which a position is accepted.
 const CHAIN: usize = 3;
 /// Read size, bytes.
 const SEARCH_BYTES: usize = 64 * 1024;
 
-/// The first position within `from..until` at which consecutive records start.
+/// Returns the first position in `from..until` at which consecutive records begin.
 ///
-/// A byte before a record may look like another record with a length that happens to end at a record boundary. A
-/// position with an unconfirmed length is therefore accepted only if no records lie within it.
+/// A byte before a record may look like another record, whose length happens to end at a record boundary. A position
+/// with an unconfirmed length is therefore accepted only if no records lie within that length.
 pub(super) fn find_records<R: Read + Seek>(
     file: &mut LogFile<R>,
     from: u64,
@@ -53,7 +53,7 @@ fn find_chain<R: Read + Seek>(
                 return Ok(Some(chain));
             }
         }
-        // Windows that cross the block's end are checked with the next block.
+        // Windows that cross the end of this block are checked with the next block.
         let whole_windows = got.saturating_sub(mcap::MAGIC.len() - 1);
         if whole_windows == 0 {
             break;
@@ -63,8 +63,9 @@ fn find_chain<R: Read + Seek>(
     Ok(None)
 }
 
-/// Quick check that rejects nearly every position: it requires a known opcode and a length below 2^32, or the closing
-/// bytes.
+/// Whether a record may begin with these bytes. This quick check rejects nearly every position.
+///
+/// It requires a known opcode and a length below 2^32, or the closing bytes.
 fn may_begin(head: &[u8]) -> bool {
     match head {
         [1..=op::DATA_END, _, _, _, _, 0, 0, 0] => true,

@@ -1,37 +1,37 @@
-//! Monitors free disk space during a recording, and decides which messages to drop when it runs low.
+//! Monitors the free disk space during a recording, and decides which messages to drop when it runs low.
 //!
-//! Small irreplaceable data (position readings, ticks, judgements, advice) is kept to the last byte. Echoes, by far the
-//! largest share of a log, are dropped first, so that the disk lasts for the whole dive.
+//! Small irreplaceable messages (position readings, ticks, judgements, advice) are recorded until the disk is full.
+//! Echoes are by far the largest share of a log, and are dropped first. The disk then lasts for the whole dive.
 //!
-//! The recorder doesn't decode devices, so it recognises echoes by source and length; the log header lists the sonars.
-//! Packets of heads that send only ranges are short and kept: such a dive still replays to its digest.
+//! The recorder can't decode devices, so it recognises echoes by source and length; the log header lists the sonars.
+//! Heads that send only ranges have short packets, which are kept. Such a dive still replays to its digest.
 
 use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
-/// Free bytes below which the user is warned, enough for some hours of a dive.
+/// Free bytes below which the user is warned. They last for some hours of a dive.
 const WARN_BELOW_BYTES: u64 = 1 << 30;
-/// Free bytes below which echoes are dropped, enough for days of the remaining messages.
+/// Free bytes below which echoes are dropped. They last for days of the remaining messages.
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
-/// Longest sonar packet that is kept, bytes. Longer packets are echoes; packets with only ranges are shorter.
+/// Maximum length of a sonar packet that is kept, bytes. Longer packets are echoes, shorter ones have only ranges.
 pub(super) const LONGEST_KEPT_BYTES: usize = 128;
 /// Interval between queries of the free space.
 const ASK_EVERY: Duration = Duration::from_secs(2);
 
-/// Messages that a recorder has dropped because its disk was nearly full.
+/// Messages that a recorder dropped because its disk was nearly full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LeftOut {
-    /// Echoes, results per echo, and viewer messages.
+    /// Number of dropped messages: echoes, results per echo, and viewer messages.
     pub messages: u64,
-    /// Their bytes.
+    /// Bytes of the dropped messages.
     pub bytes: u64,
-    /// Log times of the first and last.
+    /// Log times of the first and last dropped message.
     pub span: Option<(MonoNs, MonoNs)>,
 }
 
 impl LeftOut {
-    /// As text, without the times.
+    /// Returns the text that states the dropped messages, without the times.
     pub fn words(&self) -> String {
         let Self { messages, bytes, .. } = self;
         format!(
@@ -40,7 +40,7 @@ impl LeftOut {
     }
 }
 
-/// Monitors the free space.
+/// Monitors the free space of a recording's disk.
 #[derive(Debug, Default)]
 pub(super) struct Space {
     asked: Option<Duration>,
@@ -52,7 +52,7 @@ pub(super) struct Space {
 }
 
 impl Space {
-    /// Queries the free space when due, at `now` since the recording began.
+    /// Queries the free space if a query is due. `now` is the time since the recording began.
     pub(super) fn look(&mut self, now: Duration, ask: impl FnOnce() -> Option<u64>) {
         if self.asked.is_some_and(|asked| now.saturating_sub(asked) < ASK_EVERY) {
             return;
@@ -64,7 +64,7 @@ impl Space {
         }
         self.free = free;
         let free_mb = free / 1_000_000;
-        // Hysteresis: after echoes have been dropped, recording them resumes only with much more free space.
+        // Hysteresis: once echoes have been dropped, they are recorded again only with much more free space.
         let sparing = free < SPARE_BELOW_BYTES || (self.sparing && free < WARN_BELOW_BYTES);
         if sparing && !self.sparing {
             tracing::warn!(
@@ -82,12 +82,12 @@ impl Space {
         self.sparing = sparing;
     }
 
-    /// Whether echoes are to be dropped.
+    /// Whether echoes must be dropped now.
     pub(super) fn is_scarce(&self) -> bool {
         self.sparing
     }
 
-    /// Counts a dropped message. The first one returns the statement for the log.
+    /// Counts a dropped message. For the first one, returns the statement for the log.
     pub(super) fn leave_out(&mut self, at: MonoNs, bytes: usize) -> Option<String> {
         let first = self.left_out.span.map(|span| span.0);
         self.left_out.span = Some((first.unwrap_or(at), at));
@@ -99,7 +99,7 @@ impl Space {
             .then(|| format!("the recorder leaves echo returns out: the disk had {free} bytes free"))
     }
 
-    /// All messages dropped so far.
+    /// Returns the messages dropped so far.
     pub(super) fn left_out(&self) -> LeftOut {
         self.left_out
     }

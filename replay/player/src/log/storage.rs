@@ -1,4 +1,4 @@
-//! Storage for a recorder's files: the disk or, in tests, anything whose operations can fail or wait.
+//! Storage for a recorder's files: the disk, or in tests a storage whose operations can fail or wait.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io;
@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use crate::atomic_file::{folder_of, number_of};
 
-/// Storage for files that are created once and only grow.
+/// Storage for files that are created once and then only grow.
 pub trait Storage: Send {
-    /// Creates a file, which must not exist. Once this returns, its name survives a power cut.
+    /// Creates a file. Once this function returns, the file's name survives a power cut.
     ///
-    /// Errors: the file exists; those of the system.
+    /// Errors: the file exists already; those of the system.
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>>;
 
     /// Removes a file.
@@ -22,39 +22,39 @@ pub trait Storage: Send {
     fn free_bytes(&mut self, path: &Path) -> Option<u64>;
 }
 
-/// A file that is open for writing. Closing it by dropping writes nothing.
+/// A file open for writing. Dropping it writes nothing more.
 pub trait StoredFile: Send {
-    /// Appends a prefix of these bytes, and returns its length.
+    /// Appends the first of these bytes, as many as possible, and returns their number.
     ///
-    /// Errors: those of the system; `Interrupted` is retried.
+    /// Errors: those of the system; the caller retries after `Interrupted`.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
-    /// Syncs the file: once this returns, everything written survives a power cut.
+    /// Syncs the file. Once this function returns, everything written so far survives a power cut.
     ///
-    /// After an error, nothing written since the last success is certain. If another program has taken the file away,
-    /// nothing at all is certain.
+    /// After an error, nothing written since the last success is certain. If another program has changed the file,
+    /// nothing in it is certain.
     ///
-    /// Errors: those of the system; the file was taken away.
+    /// Errors: those of the system; another program has deleted, truncated or replaced the file.
     fn sync(&mut self) -> io::Result<()>;
 }
 
-/// The file systems of the machine.
+/// The disk: the file systems of this machine.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Disk;
 
 impl Storage for Disk {
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>> {
-        // Append mode: if another program truncates the file, it stays shorter than the written length, which shows the
-        // fault.
+        // The file is opened in append mode. If another program truncates it, its length stays below the written
+        // length, which shows the fault.
         let file = OpenOptions::new().append(true).create_new(true).open(path)?;
-        // Only on Unix, since other systems can't open folders.
+        // The folder is synced only on Unix, because other systems can't open folders.
         let synced = if cfg!(unix) {
             File::open(folder_of(path)).and_then(|folder| folder.sync_all())
         } else {
             Ok(())
         };
         if let Err(error) = synced {
-            // An error must leave no new file behind.
+            // After an error no new file may be left behind.
             self.remove(path).ok();
             return Err(error);
         }
@@ -68,12 +68,12 @@ impl Storage for Disk {
 
     fn free_bytes(&mut self, path: &Path) -> Option<u64> {
         let disk = rustix::fs::statvfs(folder_of(path)).ok()?;
-        // Space available to users other than root.
+        // Space that is available to users other than root.
         Some(disk.f_bavail.saturating_mul(disk.f_frsize))
     }
 }
 
-/// Change by another program to a recording's file, whose content is then gone or not at its path.
+/// Change by another program to a recording's file. Its content is then gone, or no longer at its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Taken {
     #[error("another program has deleted the file")]
@@ -85,22 +85,24 @@ pub(super) enum Taken {
 }
 
 impl Taken {
-    /// Whether an error has this cause.
+    /// Whether an error was caused by such a change.
     pub(super) fn is_in(error: &io::Error) -> bool {
         error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<Self>)
     }
 }
 
-/// A file on the disk that other programs may delete, truncate or replace.
+/// A file on the disk, which other programs may delete, truncate or replace.
 ///
-/// Writing continues after a move, which loses nothing.
+/// If another program moves it, writing continues in the moved file, and nothing is lost.
 struct DiskFile {
     file: File,
     path: PathBuf,
     written: u64,
-    /// Device and inode number, if the file system reports the same for the open file and its name.
+    /// Device and inode number; `None` unless the file system reports the same numbers for the open file and for its
+    /// path.
     known: Option<(u64, u64)>,
-    /// Whether it has been synced once. A dive whose first file disappears with only a header continues in another.
+    /// Whether the file has been synced once. The first sync doesn't report changes by other programs. If the first file
+    /// of a dive disappears while it has only a header, the second sync fails and the dive continues in another file.
     is_begun: bool,
 }
 
@@ -112,9 +114,9 @@ impl DiskFile {
         Self { file, path: path.to_owned(), written: 0, known, is_begun: false }
     }
 
-    /// Change to the file by other programs, if any.
+    /// Returns the change by another program, if any.
     fn taken(&self) -> Option<Taken> {
-        // If the system can't tell, the file is assumed to be in place.
+        // If the system can't tell, the file counts as unchanged.
         let own = self.file.metadata().ok()?;
         if own.len() < self.written {
             return Some(Taken::CutShort);
@@ -142,7 +144,7 @@ impl StoredFile for DiskFile {
     }
 }
 
-/// Names that a file has.
+/// Returns the number of names that a file has.
 #[cfg(unix)]
 fn links(file: &Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::nlink(file)
@@ -156,13 +158,13 @@ fn links(_: &Metadata) -> u64 {
 /// Size of the write buffer, bytes.
 const BUFFER_BYTES: usize = 64 << 10;
 
-/// A stored file as a writer.
+/// A stored file with a buffer, as a writer.
 ///
-/// Flushing syncs everything written since the last sync. Dropping discards buffered bytes.
+/// Flushing writes the buffer and syncs the file. Dropping discards buffered bytes.
 pub(super) struct Buffered {
     file: Box<dyn StoredFile>,
     buffer: Vec<u8>,
-    /// Whether nothing was written since the last sync, so that another one would be useless.
+    /// Whether nothing was written since the last sync, so that another sync isn't needed.
     is_synced: bool,
 }
 
@@ -206,7 +208,8 @@ impl io::Write for Buffered {
     }
 }
 
-/// A single writer as storage, for [`super::Recorder::start`]. Flushing it syncs it, and there is no second file.
+/// A single writer as storage, for [`super::Recorder::start`]. Flushing the writer counts as a sync. There is no
+/// second file.
 pub(super) struct OneWriter<W>(pub(super) Option<W>);
 
 struct WriterFile<W>(W);

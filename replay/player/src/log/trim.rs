@@ -1,4 +1,4 @@
-//! Writes a reduced log: limited to time spans, without echoes, or anonymised.
+//! Writes a reduced log: only certain time spans, without echoes, or anonymised.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
@@ -9,15 +9,16 @@ use super::recover::{header, lane, look_through, words};
 use super::writer::Lane;
 use super::{DiveLog, LogError, LogHeader, LogInfo, LogMessage, LogWriter, ResultChannel};
 
-/// Metadata key of a trimmed log that describes the changes.
+/// Metadata key of a trimmed log. Its value describes the changes.
 pub const TRIMMED: &str = "trimmed";
 
-/// Changes a source message: may write replacement bytes, and returns whether it did. Empty bytes drop the message.
+/// Changes a source message. It may write replacement bytes, and returns whether it did. Empty bytes drop the
+/// message.
 pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
 
-/// The content of a log to keep, and the changes to it.
+/// Content of a log to keep, and changes to it.
 pub struct Trim<'a> {
-    /// Log time spans to keep, each from and to, in order and without overlap; empty keeps everything.
+    /// Spans of log time to keep, in order and without overlap. An empty list keeps everything.
     pub spans: Vec<(MonoNs, MonoNs)>,
     /// Description of the changes, for the log's metadata.
     pub words: String,
@@ -27,37 +28,38 @@ pub struct Trim<'a> {
     pub change: Change<'a>,
     /// Whether to keep voice recordings within the spans.
     pub voices: bool,
-    /// Whether to keep the results of a topic, if the whole dive is kept.
+    /// Decides for a topic whether its results are kept. Results are kept only if the whole dive is kept.
     pub results: &'a dyn Fn(&str) -> bool,
 }
 
-/// Outcome of trimming.
+/// Result of trimming.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Trimmed {
-    /// Messages written.
+    /// Number of messages written.
     pub messages: u64,
-    /// Messages outside the spans.
+    /// Number of messages dropped because they are outside the spans.
     pub cut: u64,
-    /// Dropped result messages. A part of a dive gets other judgements than the whole, and some results name people.
+    /// Number of result messages dropped. A trimmed dive would get other judgements, and some results name people.
     pub results: u64,
-    /// Source messages that were changed.
+    /// Number of source messages that were changed.
     pub changed: u64,
-    /// Source messages that became empty.
+    /// Number of source messages that became empty and were dropped.
     pub emptied: u64,
     /// Bytes of source messages before the change.
     pub bytes_before: u64,
     /// Bytes of source messages after the change.
     pub bytes_after: u64,
-    /// Losses of the original log.
+    /// Number of losses of the original log.
     pub losses: u64,
     /// Log times of the first and last message written, in log order.
     pub span: Option<(MonoNs, MonoNs)>,
 }
 
-/// Writes the kept content of a log to `output`, in the same order. The new log states the cut spans as losses.
+/// Writes the content to keep to `output`, in the same order. The new log states the removed spans as losses.
+///
 /// `open` opens the log; it is called twice. `known` are the result channels whose schemas this program has.
 ///
-/// Errors: the log can't be read, or the output not written.
+/// Errors: the log can't be read, or the output can't be written.
 pub fn trim<R: Read + Seek, W: Write>(
     open: &mut dyn FnMut() -> Result<DiveLog<R>, LogError>,
     output: W,
@@ -94,7 +96,7 @@ pub fn trim<R: Read + Seek, W: Write>(
     Ok(cutter.done)
 }
 
-/// States the cuts in a log whose messages lie between two times.
+/// States the removed spans as losses. `times` are the first and last time of the original log.
 fn state_cuts<W: Write>(
     spans: &[(MonoNs, MonoNs)],
     times: Option<(MonoNs, MonoNs)>,
@@ -102,7 +104,7 @@ fn state_cuts<W: Write>(
 ) -> Result<(), LogError> {
     let (Some(first), Some(last), Some(times)) = (spans.first(), spans.last(), times) else { return Ok(()) };
     if times.0 < first.0 {
-        log.lost(None, Some(first.0), "the part before was removed by headrace trim")?;
+        log.lost(None, Some(first.0), "earlier data was cut off by headrace trim")?;
     }
     for pair in spans.windows(2) {
         if let [before, after] = pair {
@@ -110,19 +112,19 @@ fn state_cuts<W: Write>(
         }
     }
     if times.1 >= last.1 {
-        log.lost(Some(last.1), None, "the part after was removed by headrace trim")?;
+        log.lost(Some(last.1), None, "later data was cut off by headrace trim")?;
     }
     Ok(())
 }
 
-/// Writes the messages to keep, one after the other.
+/// Writes the messages that are kept, one after the other.
 struct Cutter<'a, W: Write> {
     numbers: BTreeMap<&'a str, u16>,
     log: LogWriter<W>,
     done: Trimmed,
-    /// Sources of the packets kept since the last tick, in order.
+    /// Source numbers of the packets kept since the last tick, in order.
     order: Vec<u16>,
-    /// Whether all packets were kept.
+    /// Whether all packets since the last tick were kept.
     whole: bool,
     shorter: Vec<u8>,
 }
@@ -165,7 +167,7 @@ impl<W: Write> Cutter<'_, W> {
         written
     }
 
-    /// Writes a tick that lists only its kept packets.
+    /// Writes a tick. If packets were dropped, the tick lists only the packets that were kept.
     fn tick(&mut self, message: &LogMessage<'_>) -> Result<(), LogError> {
         let order = core::mem::take(&mut self.order);
         let whole = core::mem::replace(&mut self.whole, true);

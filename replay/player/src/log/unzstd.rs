@@ -1,7 +1,7 @@
-//! Unpacks chunks packed by zstd in bounded memory.
+//! Unpacks chunks packed by zstd, with limited memory.
 //!
-//! Works like the `mcap` crate's decompressor, except that it limits the window, which a frame may otherwise set to 128
-//! MiB. Formats of zstd before 0.8, which have windows of their own, aren't supported.
+//! It works like the `mcap` crate's decompressor, but limits the window, which a frame may otherwise set to 128 MiB.
+//! Formats of zstd before 0.8 have windows of another kind, and aren't supported.
 
 use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
 use mcap::{McapError, McapResult};
@@ -9,18 +9,18 @@ use zstd_safe::{DCtx, DParameter, InBuffer, OutBuffer, ResetDirective, get_error
 
 use super::limits::MAX_WINDOW_LOG;
 
-/// Error text of zstd for a window over the limit.
+/// Error text of zstd for a window beyond the limit.
 pub(super) const TOO_MUCH_MEMORY: &str = "Frame requires too much memory for decoding";
-/// Magic numbers of a frame and of a skippable frame, whose last four bits are free. Source: RFC 8878, 3.1.
+/// Magic numbers of a frame, and of a skippable frame without its four free bits. Source: RFC 8878, 3.1.
 const FRAME: u32 = 0xFD2F_B528;
 const SKIPPABLE: u32 = 0x184D_2A50;
 
-/// Decompresses frames with windows of up to 2^[`MAX_WINDOW_LOG`] bytes.
+/// Decompressor for frames with windows of up to 2^[`MAX_WINDOW_LOG`] bytes.
 #[derive(Default)]
 pub(super) struct Unzstd {
-    /// Created on first use.
+    /// Decompression context, created on first use.
     context: Option<DCtx<'static>>,
-    /// Bytes that zstd suggests to read next; 0 before a frame.
+    /// Number of bytes that zstd suggests to read next; 0 before a frame.
     need: usize,
 }
 
@@ -35,7 +35,7 @@ impl Decompressor for Unzstd {
 
     fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
         if self.need == 0 {
-            // Too few bytes for the magic number; asks for more.
+            // There are too few bytes for the magic number, so more are requested.
             let Some(magic) = src.first_chunk() else {
                 return Ok(DecompressResult { consumed: 0, wrote: 0 });
             };

@@ -1,8 +1,10 @@
 //! Voice recordings in a log: from the operator's page to the recorder, and back.
 //!
-//! A message of `/notes/voice` has, in little-endian order: u32 id of the note, u32 seconds, u16 length of the media
-//! type, the media type, then the recording as the browser made it. It has its own chunk, so damage to it affects
-//! nothing else. No replay reads it; the operator's commands hold everything the loop needs.
+//! A message of `/notes/voice` has in little-endian order: u32 id of the note, u32 seconds, u16 length of the media
+//! type, the media type, and the recording as the browser made it. The message has its own chunk, so damage to it
+//! affects nothing else.
+//!
+//! A replay doesn't read these messages, because the operator's commands contain everything that the loop needs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,7 +17,7 @@ use super::fields::Fields;
 use super::queue::State;
 use super::{DiveLog, LogError, MessageKind};
 
-/// Reason why a recording isn't accepted.
+/// Reason why a voice recording isn't accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotKept {
@@ -27,11 +29,11 @@ pub enum NotKept {
     Full,
 }
 
-/// A message that isn't a valid voice recording.
+/// Reason why a message isn't a valid voice recording.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VoiceMessageError {
-    /// The message is shorter than its fields say.
+    /// The message is shorter than its fields state.
     #[error("a voice message of {0} bytes is cut off in its head")]
     Short(usize),
     /// The recording is invalid.
@@ -46,9 +48,10 @@ pub struct VoicePort {
 }
 
 impl VoicePort {
-    /// Passes a recording to the log. Never blocks.
+    /// Passes a recording to the log, without blocking.
     ///
-    /// It is as safe as sensor data: it is written within a second, and again in another part if the medium then fails.
+    /// The recording is as safe as sensor data. It is written within a second, and written again to another part if
+    /// the medium fails.
     ///
     /// Errors: see [`NotKept`]; nothing was accepted.
     pub fn keep(&self, voice: &Voice) -> Result<(), NotKept> {
@@ -56,8 +59,8 @@ impl VoicePort {
             return Err(NotKept::Failing);
         }
         self.state.voices.push(encode(voice)).map_err(|_| NotKept::Full)?;
-        // The recorder sets the flag before its last look at the queue. If it is still unset, this recording will be
-        // taken.
+        // The recorder sets the flag before it looks at the queue for the last time. If the flag is still unset, it
+        // takes this recording.
         if self.state.voices_end.load(Ordering::SeqCst) { Err(NotKept::Failing) } else { Ok(()) }
     }
 }
@@ -74,7 +77,7 @@ pub fn encode(voice: &Voice) -> Vec<u8> {
     message
 }
 
-/// Decodes a message. Since logs may come from anywhere, the recording must pass the page's own checks.
+/// Decodes a message. The recording must pass the page's own checks, because a log may come from anywhere.
 ///
 /// Errors: see [`VoiceMessageError`].
 pub fn decode(message: &[u8]) -> Result<Voice, VoiceMessageError> {
@@ -90,9 +93,9 @@ pub fn decode(message: &[u8]) -> Result<Voice, VoiceMessageError> {
     Ok(Voice { id, seconds, container, audio: audio.to_vec() }.checked()?)
 }
 
-/// Finds the recording of a note in a log, at or after `from`, the time of the note.
+/// Finds the recording of a note in a log. `from` is the time of the note; the recording isn't earlier.
 ///
-/// `None` if the log has no readable recording of it.
+/// Returns `None` if the log has no readable recording of the note.
 ///
 /// Errors: the log can't be read.
 pub fn find_voice(files: &[PathBuf], id: u32, from: MonoNs) -> Result<Option<Voice>, LogError> {
@@ -122,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_voice_has_the_documented_layout() {
+    fn voice_message_has_the_documented_layout() {
         let message = encode(&voice(b"OggS.."));
         assert_eq!(message[..10], [2, 1, 0, 0, 12, 0, 0, 0, 9, 0]);
         assert_eq!(&message[10..], b"audio/oggOggS..");
@@ -142,7 +145,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_decode_to_a_valid_voice_or_an_error(bytes: Vec<u8>) {
+        fn any_bytes_decode_to_a_valid_voice_recording_or_an_error(bytes: Vec<u8>) {
             if let Ok(voice) = decode(&bytes) {
                 prop_assert_eq!(voice.checked().map(|voice| encode(&voice).len()), Ok(bytes.len()));
             }

@@ -1,4 +1,4 @@
-//! The recorder's work: takes entries from the queue and writes them.
+//! The work of a recorder: takes entries from the queue and writes them to the log.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,32 +15,33 @@ use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::voice::VoicePort;
 use super::writer::{Lane, LogHeader, Summary};
 
-/// Interval at which a chunk is closed and synced. It is half of the second that a power cut may cost, since closing
-/// and syncing take time too.
+/// Interval at which a chunk is closed and synced.
+///
+/// A power cut may cost a second. The interval is half of that, because closing and syncing take time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// Interval between statements of packets dropped by lines.
+/// Interval between statements about packets that lines dropped.
 const DROPPED_PERIOD: Duration = Duration::from_secs(5);
-/// Entries written in one step.
+/// Maximum number of entries written in one step.
 const BATCH: usize = 256;
 
-/// A recorder without its thread. The caller runs the steps and passes the time.
+/// A recorder without its thread. The caller runs its steps, and supplies the time.
 pub struct RecorderWorker {
     queue: Queue,
     recording: Recording,
     flushed: Duration,
-    /// Whether anything was written since the last flush.
+    /// Whether anything has been written since the last flush.
     open: bool,
     space: Space,
     echoes: Echoes,
     beside: Beside,
     /// Number of packets in skipped ticks.
     skipped: u64,
-    /// Names of the sources.
+    /// Ids of the sources.
     ids: Vec<String>,
-    /// Packets dropped by lines since the last statement, by source, and the time of that statement.
+    /// Packets dropped by lines since the last statement, by source; and time of that statement.
     dropped: BTreeMap<u16, Dropped>,
     dropped_stated: Duration,
-    /// Log time of the last entry. Voice recordings get it as their time, since they have no time of their own.
+    /// Log time of the last entry. A voice recording has no log time of its own, so it gets this one.
     last: Option<MonoNs>,
     state: Arc<State>,
     _closed: ClosedWhenDropped,
@@ -52,10 +53,10 @@ struct Beside {
     made: Vec<Made>,
 }
 
-/// Recognises messages that are dropped when the disk fills.
+/// Recognises messages that are dropped while the disk is nearly full.
 struct Echoes {
     sonars: Vec<u16>,
-    /// For each result channel, whether it has a record per echo.
+    /// For each result channel, whether its messages are dropped together with echoes.
     results: Vec<bool>,
 }
 
@@ -101,29 +102,29 @@ impl RecorderWorker {
         }
     }
 
-    /// A port for traffic on devices' lines that bypasses the loop.
+    /// Returns a port for line traffic that doesn't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }
 
-    /// A port for the recordings of voice notes.
+    /// Returns a port for recordings of voice notes.
     pub fn voice_port(&self) -> VoicePort {
         VoicePort { state: Arc::clone(&self.state) }
     }
 
-    /// The next event of the recording, oldest first; each is returned once.
+    /// Returns the oldest event of the recording that has not been returned yet.
     pub fn next_event(&self) -> Option<RecordingEvent> {
         self.state.events.pop()
     }
 
-    /// The state that it shares with its port.
+    /// Returns the state that the worker shares with its port.
     pub(super) fn state(&self) -> &Arc<State> {
         &self.state
     }
 
-    /// Writes some entries of the queue; syncs and retries if due.
+    /// Writes some entries of the queue. Also syncs, or tries again after an error, if due.
     ///
-    /// `now` is the time since the recording began and never goes back. Returns whether the queue had entries.
+    /// `now` is the time since the recording began, which never goes back. Returns whether the queue had entries.
     pub fn step(&mut self, now: Duration) -> bool {
         let recording = &mut self.recording;
         self.space.look(now, || recording.free_bytes());
@@ -141,8 +142,8 @@ impl RecorderWorker {
         taken += self.write_voices();
         self.state_gaps();
         self.state_dropped(now, false);
-        // A slow sync covers everything that arrived during the last one. Under constant load the backlog's size
-        // triggers a sync.
+        // A full batch means that the recorder is behind, so it doesn't sync yet. The next sync then covers all
+        // entries that arrived meanwhile. Under constant load the size of the backlog triggers a sync.
         if !is_behind {
             self.flush_in_time(now);
         }
@@ -153,7 +154,7 @@ impl RecorderWorker {
     /// Writes the rest of the queue, and ends the log.
     pub fn finish(mut self, now: Duration) -> Summary {
         self.state.voices_end.store(true, Ordering::SeqCst);
-        // Ending the log syncs the rest.
+        // No sync is needed before the end, because ending the log syncs the rest.
         self.flushed = now;
         while self.step(now) {}
         self.state_dropped(now, true);
@@ -180,7 +181,7 @@ impl RecorderWorker {
         summary
     }
 
-    /// States the skipped ticks in the log.
+    /// Writes statements of skipped ticks to the log.
     fn state_gaps(&mut self) {
         while let Some(Gap { span: (from, to), packets }) = self.state.gaps.pop() {
             self.skipped += packets;
@@ -189,9 +190,9 @@ impl RecorderWorker {
         }
     }
 
-    /// States the packets dropped by lines, at the end or every few seconds.
+    /// Writes statements of packets that lines dropped, every few seconds and at the end.
     ///
-    /// The interval keeps a log readable in which packets are missing for hours.
+    /// The interval limits the number of statements if packets are dropped for hours.
     fn state_dropped(&mut self, now: Duration, at_end: bool) {
         let dropped = core::iter::from_fn(|| self.state.dropped.pop());
         for Dropped { source, span: (from, to), packets } in dropped {
@@ -233,7 +234,7 @@ impl RecorderWorker {
         self.state.failing.store(self.recording.is_failing(), Ordering::Release);
     }
 
-    /// Writes the last taken entry and the messages derived from it.
+    /// Writes the entry taken last, and the messages derived from it.
     fn write_all(&mut self, entry: &Entry) {
         let message = core::mem::take(&mut self.queue.message);
         self.write(entry, &message);
@@ -266,7 +267,7 @@ impl RecorderWorker {
         self.recording.message(entry.lane, entry.log_time, entry.publish_time, message);
     }
 
-    /// Writes the bytes sent to the devices; returns the number of messages.
+    /// Writes the bytes sent to devices. Returns the number of messages.
     fn write_sent(&mut self) -> usize {
         let mut written = 0;
         while let Some(message) = self.state.sent.pop() {
@@ -278,7 +279,7 @@ impl RecorderWorker {
         written
     }
 
-    /// Writes voice recordings once the dive has begun; returns their number.
+    /// Writes voice recordings, once the dive has begun. Returns their number.
     fn write_voices(&mut self) -> usize {
         let mut written = 0;
         while let Some(at) = self.last

@@ -1,4 +1,4 @@
-//! Writes a log on the caller's thread. No other module turns messages into records.
+//! Writes a log on the caller's thread. Only this module encodes messages as records.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,11 +19,13 @@ use super::format::{
 use super::part::{PART, PART_END, PartEnd, PartHead, Progress};
 use super::{LeftOut, LogError, RecordingFault};
 
-/// Size at which a chunk is closed, whatever its time span, bytes.
+/// Size at which a chunk is closed, bytes, whatever its time span is.
 const CHUNK_BYTES: u64 = 1 << 20;
-/// Time span of messages, in dive time, at which a chunk is closed.
+/// Span of dive time at which a chunk is closed.
 const CHUNK_SPAN: DurNs = DurNs(500_000_000);
-/// Bytes of the summary per chunk, and per channel in each. Source: MCAP format specification, "Chunk Index".
+/// Length of the summary for each chunk, and for each channel in a chunk, bytes.
+///
+/// Source: MCAP format specification, "Chunk Index".
 const CHUNK_INDEX_BYTES: u64 = 80;
 const CHUNK_INDEX_CHANNEL_BYTES: u64 = 10;
 
@@ -32,26 +34,27 @@ const CHUNK_INDEX_CHANNEL_BYTES: u64 = 10;
 pub struct LogHeader {
     /// Text of the vehicle file; empty if there is none.
     pub vehicle_toml: String,
-    /// Files named by the vehicle file: name and content.
+    /// Name and content of each file that the vehicle file names.
     pub attachments: Vec<(String, Vec<u8>)>,
-    /// Version, digest of the configuration, clock anchors and the like.
+    /// Metadata, such as the version, the digest of the configuration, and clock anchors.
     pub metadata: BTreeMap<String, String>,
-    /// The sources; a source's index is its number in the messages.
+    /// The sources. A source's index is its number in the messages.
     pub sources: Vec<SourceInfo>,
-    /// Whether ticks will be written. The log of a simulation has no ticks and no channel for them.
+    /// Whether the log will have ticks. The log of a simulation has none, and no channel for them.
     pub ticks: bool,
-    /// Whether recordings of voice notes may be written.
+    /// Whether the log may have recordings of voice notes.
     pub voices: bool,
-    /// The results; a result's index is its number in the messages.
+    /// The result channels. A channel's index is its number in the messages.
     pub results: Vec<ResultChannel>,
-    /// Numbers of the sources that are sonars. Their long packets are echoes, dropped first when a disk fills.
+    /// Numbers of the sources that are sonars. Their long packets are echoes, which are dropped first when a disk
+    /// fills.
     pub sonars: Vec<u16>,
-    /// Metadata of this part if there are several. Its channels continue the numbering.
+    /// Metadata of this part, if the recording has parts. The part continues the message numbers of earlier parts.
     pub part: Option<PartHead>,
 }
 
 impl LogHeader {
-    /// Whether a log with this header has a channel for a message.
+    /// Whether a log with this header has a channel for such a message.
     pub(super) fn has(&self, lane: Lane) -> bool {
         match lane {
             Lane::Raw(source) | Lane::Sent(source) => usize::from(source) < self.sources.len(),
@@ -62,57 +65,58 @@ impl LogHeader {
     }
 }
 
-/// A source of bytes, as its channels describe it.
+/// A source of bytes, as described by the metadata of its channels.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SourceInfo {
-    /// Name of the source and of its channels.
+    /// Id of the source, which is also part of its topics.
     pub id: String,
-    /// Kind of device; empty where unknown.
+    /// Kind of device; empty if unknown.
     pub plugin: String,
-    /// Connection of the device; empty where unknown.
+    /// Connection of the device; empty if unknown.
     pub connect: String,
 }
 
 /// A channel of results.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ResultChannel {
-    /// Its topic, which begins with `/result/`.
+    /// Topic, which begins with `/result/`.
     pub topic: String,
-    /// Name of its schema, for instance `foxglove.PoseInFrame`.
+    /// Name of the schema, such as `foxglove.PoseInFrame`.
     pub schema_name: String,
-    /// Schema encoding, for instance `jsonschema`.
+    /// Encoding of the schema, such as `jsonschema`.
     pub schema_encoding: String,
-    /// The schema.
+    /// Text of the schema.
     pub schema: String,
-    /// Message encoding, for instance `json`.
+    /// Encoding of the messages, such as `json`.
     pub message_encoding: String,
-    /// Whether it is dropped with the echoes when the disk fills: it has a record per echo, or a replay doesn't need
-    /// it.
+    /// Whether the messages are dropped together with echoes when the disk fills.
+    ///
+    /// True if the channel has a record per echo, or a replay doesn't need it.
     pub follows_echoes: bool,
 }
 
 /// Totals of a written log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Summary {
-    /// Messages of all channels.
+    /// Number of messages of all channels.
     pub messages: u64,
-    /// Bytes of these messages, uncompressed and without framing.
+    /// Length of these messages, uncompressed and without framing, bytes.
     pub message_bytes: u64,
-    /// Chunks, including the one with the channel definitions.
+    /// Number of chunks, including the one with the channel definitions.
     pub chunks: u32,
-    /// Bytes of the file.
+    /// Length of the file, bytes.
     pub bytes: u64,
-    /// Messages from the sources.
+    /// Number of messages from sources.
     pub raw_messages: u64,
-    /// Errors while it was recorded.
+    /// Faults while the log was recorded.
     pub faults: Vec<RecordingFault>,
     /// Messages dropped because the disk was nearly full.
     pub left_out: LeftOut,
-    /// Messages to devices that didn't fit in the recorder's queue.
+    /// Number of messages to devices that didn't fit in the recorder's queue.
     pub sent_dropped: u64,
-    /// Packets of ticks that this recorder skipped because it was too far behind while another recorder continued.
+    /// Number of packets in skipped ticks. This recorder was too far behind, while another one continued.
     pub skipped: u64,
-    /// Ticks whose results didn't all fit in the recorder's queue.
+    /// Number of ticks whose results didn't all fit in the recorder's queue.
     pub results_missing: u64,
     /// The files of a recording, in order.
     pub parts: Vec<PartSummary>,
@@ -121,13 +125,13 @@ pub struct Summary {
 /// A written part of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartSummary {
-    /// Its file.
+    /// Path of the part's file.
     pub path: PathBuf,
-    /// Messages from the sources.
+    /// Number of messages from sources.
     pub raw_messages: u64,
 }
 
-/// A channel by its content.
+/// Destination of a message: a channel, identified by its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Lane {
     Raw(u16),
@@ -137,7 +141,7 @@ pub(super) enum Lane {
     Voice,
 }
 
-/// A channel of the file and its next message number.
+/// A channel of the file, with the number of its next message.
 #[derive(Debug, Clone, Copy)]
 struct Channel {
     id: u16,
@@ -146,13 +150,14 @@ struct Channel {
 
 /// Writes a log.
 ///
-/// The underlying writer only appends and never seeks, so written bytes stay unchanged. Only [`LogWriter::finish`] ends
-/// a log. A log that is dropped or had an error gets neither summary nor footer, so that readers find it cut off.
+/// The underlying writer only appends and never seeks, so bytes that were written stay unchanged. Only
+/// [`LogWriter::finish`] ends a log. A log that is dropped or had an error gets neither summary nor footer, so
+/// readers recognise it as cut off.
 ///
-/// Chunks are compressed with zstd at its lowest level. A dive produces some hundred kB/s, and even a small computer
-/// compresses a thousand times faster, so the smaller file counts more than the speed of lz4.
+/// Chunks are compressed by zstd at its lowest level. A dive produces some hundred kB/s, which even a small computer
+/// compresses a thousand times faster. A smaller file is therefore worth more than the speed of lz4.
 pub struct LogWriter<W: Write> {
-    /// Declared first: it must be dropped before the writer, which would otherwise end the log.
+    /// Declared before the writer, so that it is dropped first. Otherwise the writer would end the log on drop.
     medium: Closing,
     writer: mcap::Writer<NoSeek<Counted<W>>>,
     raw: Vec<Channel>,
@@ -166,18 +171,18 @@ pub struct LogWriter<W: Write> {
     raw_messages: u64,
     chunks: u64,
     last_tick: Option<u64>,
-    /// Totals of earlier parts.
+    /// Totals of the earlier parts.
     before: Progress,
-    /// Number of stated losses.
+    /// Number of losses stated so far.
     losses: u64,
-    /// Time of the first message of the open chunk.
+    /// Log time of the open chunk's first message.
     chunk_began: Option<MonoNs>,
     /// Whether the last message was a voice recording.
     is_alone: bool,
 }
 
 impl LogWriter<BufWriter<File>> {
-    /// Starts a log in a file, overwriting an existing one.
+    /// Starts a log in a file. An existing file is overwritten.
     ///
     /// Errors: the file can't be created or written, or the header isn't allowed (see [`LogWriter::new`]).
     pub fn create(path: &Path, header: &LogHeader) -> Result<Self, LogError> {
@@ -187,15 +192,17 @@ impl LogWriter<BufWriter<File>> {
 }
 
 impl<W: Write> LogWriter<W> {
-    /// Starts a log and writes everything before the first message.
+    /// Starts a log, and writes everything that comes before the first message.
     ///
-    /// Errors: the writer's, a result topic outside `/result/`, or more channels than MCAP allows.
+    /// Errors: those of the writer; the topic of a result doesn't begin with `/result/`; more channels than MCAP
+    /// allows.
     pub fn new(writer: W, header: &LogHeader) -> Result<Self, LogError> {
         if let Some(result) = header.results.iter().find(|result| !result.topic.starts_with(RESULT_PREFIX)) {
             return Err(LogError::Topic { topic: result.topic.clone() });
         }
-        // With threads the output would depend on the machine, but the log of a simulation must depend only on its
-        // scene. Without seeking, a chunk is written as soon as it is closed.
+        // No threads: the log of a simulation must depend only on its scene, and threads would make it depend on the
+        // machine.
+        // No seeking: each chunk is written as soon as it is closed.
         let options = mcap::WriteOptions::new()
             .profile("headrace")
             .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
@@ -251,7 +258,7 @@ impl<W: Write> LogWriter<W> {
         Ok(log)
     }
 
-    /// Continues the message numbers of earlier parts.
+    /// Continues the message numbers of the earlier parts.
     fn count_on(&mut self, header: &LogHeader) {
         let before = core::mem::take(&mut self.before);
         for (topic, channel) in self.channels(header) {
@@ -260,7 +267,7 @@ impl<W: Write> LogWriter<W> {
         self.before = before;
     }
 
-    /// All channels with their topics.
+    /// Returns all channels with their topics.
     fn channels(&mut self, header: &LogHeader) -> Vec<(String, &mut Channel)> {
         let topics =
             |prefix: &'static str| header.sources.iter().map(move |source| format!("{prefix}{}", source.id));
@@ -272,16 +279,16 @@ impl<W: Write> LogWriter<W> {
         all
     }
 
-    /// Approximate size of the file if it were ended now, bytes. The last chunk isn't compressed yet.
+    /// Returns the approximate length of the file if it were ended now, bytes. The open chunk counts uncompressed.
     pub(super) fn bytes(&self) -> u64 {
         let channels = self.raw.len() + self.sent.len() + self.results.len() + 1;
         let index = CHUNK_INDEX_BYTES + CHUNK_INDEX_CHANNEL_BYTES * channels as u64;
         self.medium.0.bytes.load(Ordering::Relaxed) + index * self.chunks
     }
 
-    /// Writes the totals including this part, and whether another follows. Closes the chunk.
+    /// Writes the totals up to the end of this part, and whether another part follows. Closes the chunk.
     ///
-    /// Errors: the writer's.
+    /// Errors: those of the writer.
     pub(super) fn end_part(&mut self, follows: bool) -> Result<(), LogError> {
         let messages = self.before.messages + self.messages;
         let after = Progress { messages, tick: self.last_tick, ..Progress::default() };
@@ -291,9 +298,9 @@ impl<W: Write> LogWriter<W> {
         self.writer.write_metadata(&record).map_err(LogError::writing("the end of a part"))
     }
 
-    /// Bytes from `source`, received at `received` and valid at `valid`.
+    /// Writes bytes from `source`, received at `received` and valid at `valid`.
     ///
-    /// Errors: the writer's, or a source not in the header.
+    /// Errors: those of the writer; the header has no such source.
     pub fn raw(
         &mut self,
         source: u16,
@@ -304,16 +311,16 @@ impl<W: Write> LogWriter<W> {
         self.message(Lane::Raw(source), received, valid, bytes)
     }
 
-    /// Bytes sent to `source`.
+    /// Writes bytes sent to `source`.
     ///
-    /// Errors: the writer's, or a source not in the header.
+    /// Errors: those of the writer; the header has no such source.
     pub fn sent(&mut self, source: u16, at: MonoNs, bytes: &[u8]) -> Result<(), LogError> {
         self.message(Lane::Sent(source), at, at, bytes)
     }
 
-    /// A tick of the loop, and the numbers of the sources in the order of consumption of their packets.
+    /// Writes a tick of the loop, with the source numbers of its packets in the order of consumption.
     ///
-    /// Errors: the writer's, or the header has no ticks.
+    /// Errors: those of the writer; the header has no ticks.
     pub fn tick(&mut self, index: u64, now: MonoNs, order: &[u16]) -> Result<(), LogError> {
         let packets =
             u32::try_from(order.len()).map_err(|_| LogError::TickTooLong { packets: order.len() })?;
@@ -326,9 +333,9 @@ impl<W: Write> LogWriter<W> {
         written
     }
 
-    /// A message of result channel `channel`.
+    /// Writes a message of result channel `channel`.
     ///
-    /// Errors: the writer's, or a result not in the header.
+    /// Errors: those of the writer; the header has no such result.
     pub fn result(&mut self, channel: u16, time: MonoNs, bytes: &[u8]) -> Result<(), LogError> {
         self.message(Lane::Result(channel), time, time, bytes)
     }
@@ -356,12 +363,13 @@ impl<W: Write> LogWriter<W> {
             publish_time: publish_time.0,
         };
         channel.sequence = channel.sequence.wrapping_add(1);
-        // Closing chunks by time limits the damage to one chunk, however fast the dive is written. A voice recording is
-        // as large as seconds of a dive, so it gets its own chunk: damage to it affects nothing else.
+        // A chunk is closed by time, so that damage to it loses only half a second, whatever the data rate.
+        // A voice recording is as large as several seconds of a dive, so it gets its own chunk, and damage to it affects
+        // nothing else.
         let is_alone = core::mem::replace(&mut self.is_alone, lane == Lane::Voice) || self.is_alone;
         if self.chunk_began.is_some_and(|began| is_alone || log_time.since(began).0 >= CHUNK_SPAN.0) {
-            // The `mcap` crate flushes when it closes a chunk. The flush stops here, since the caller decides when to
-            // sync.
+            // The `mcap` crate flushes when it closes a chunk. The flush must not reach the medium, because the
+            // caller decides when to sync.
             self.medium.0.is_spared.store(true, Ordering::Relaxed);
             let closed = self.writer.flush();
             self.medium.0.is_spared.store(false, Ordering::Relaxed);
@@ -381,9 +389,9 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
-    /// States a loss in the log, after `from` and before `to` where known. Closes the chunk.
+    /// Writes a statement of a loss between `from` and `to`; `None` if a time is unknown. Closes the chunk.
     ///
-    /// Errors: the writer's.
+    /// Errors: those of the writer.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {
         let entry = (format!("{:06}", self.losses), stated_loss(from, to, words));
         let record = Metadata { name: LOSSES.to_owned(), metadata: seal(LOSSES, [entry].into()) };
@@ -392,9 +400,9 @@ impl<W: Write> LogWriter<W> {
         self.flush()
     }
 
-    /// Closes the chunk and flushes the writer: everything written so far survives a crash.
+    /// Closes the chunk and flushes the writer. Everything written so far then survives a crash.
     ///
-    /// Errors: the writer's.
+    /// Errors: those of the writer.
     pub fn flush(&mut self) -> Result<(), LogError> {
         self.chunks += u64::from(self.chunk_began.take().is_some());
         self.writer.flush().map_err(LogError::writing("a chunk"))
@@ -402,7 +410,7 @@ impl<W: Write> LogWriter<W> {
 
     /// Writes the summary, flushes, and returns the writer.
     ///
-    /// Errors: the writer's.
+    /// Errors: those of the writer.
     pub fn finish(mut self) -> Result<(W, Summary), LogError> {
         let chunks = self.writer.finish().map_err(LogError::writing("the summary"))?.chunk_indexes.len();
         let mut writer = self.writer.into_inner();
@@ -438,13 +446,13 @@ fn write_metadata<W: Write>(
 #[derive(Default)]
 struct Medium {
     bytes: AtomicU64,
-    /// Set to stop the `mcap` crate's writer from ending the log when it is dropped, also after an error.
+    /// Set to refuse further bytes: after an error, and before the `mcap` crate's writer ends the log on drop.
     shut: AtomicBool,
-    /// Whether a flush stops before the medium.
+    /// Whether a flush must not reach the medium.
     is_spared: AtomicBool,
 }
 
-/// Shuts the medium when it is dropped.
+/// Closes the medium to further bytes on drop.
 struct Closing(Arc<Medium>);
 
 impl Drop for Closing {
@@ -453,7 +461,7 @@ impl Drop for Closing {
     }
 }
 
-/// A writer that counts its bytes and accepts nothing after an error.
+/// A writer that counts its bytes, and accepts nothing after an error.
 struct Counted<W> {
     writer: W,
     medium: Arc<Medium>,
@@ -503,7 +511,7 @@ fn attach<W: Write>(
     writer.attach(&attachment).map_err(LogError::writing("an attachment"))
 }
 
-/// Adds channels and collects them for the record that repeats them.
+/// Adds channels, and collects them for the record that repeats the definitions.
 struct ChannelList<'a, W: Write> {
     writer: &'a mut mcap::Writer<NoSeek<Counted<W>>>,
     list: BTreeMap<String, String>,

@@ -1,13 +1,14 @@
-//! Content-defined chunking: cuts bytes into blocks so that two snapshots share the blocks they have in common.
+//! Content-defined chunking: cuts bytes into blocks, so that two snapshots share most of their blocks.
 //!
 //! Cuts depend on the surrounding bytes, not on their offset (gear hash: Xia et al., "FastCDC", USENIX ATC 2016). An
-//! insertion therefore changes the blocks around it and none behind.
+//! insertion therefore changes only the blocks around it.
 
-/// Minimum length of a block except the last, bytes.
+/// Minimum length of a block, bytes. Only the last block may be shorter.
 const MIN_BYTES: usize = 8 << 10;
 /// Maximum length of a block, bytes.
 const MAX_BYTES: usize = 128 << 10;
-/// A block ends where these bits of the hash are zero: on average every 32 KiB beyond the minimum length.
+/// A block ends where these bits of the hash are zero. Beyond the minimum length this happens every 32 KiB on
+/// average.
 const CUT_MASK: u64 = 0x7fff << 48;
 
 /// A pseudorandom number for each value of a byte (splitmix64).
@@ -28,7 +29,7 @@ const fn gear() -> [u64; 256] {
     table
 }
 
-/// The blocks in order; concatenated they are `bytes`.
+/// Returns the blocks in order. Their concatenation is `bytes`.
 pub(super) fn blocks(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = bytes;
     core::iter::from_fn(move || {
@@ -38,7 +39,7 @@ pub(super) fn blocks(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     })
 }
 
-/// Length of the first block.
+/// Returns the length of the first block; `None` for no bytes.
 fn first_len(bytes: &[u8]) -> Option<usize> {
     if bytes.len() <= MIN_BYTES {
         return (!bytes.is_empty()).then_some(bytes.len());
@@ -70,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_have_bounded_lengths_and_make_up_the_whole() {
+    fn block_lengths_are_bounded_and_their_mean_as_designed() {
         let bytes = noise(4 << 20, 1);
         let cut: Vec<&[u8]> = blocks(&bytes).collect();
         assert_eq!(cut.concat(), bytes);

@@ -1,7 +1,7 @@
-//! Stores snapshots of a replay in memory, so that playback can jump back without starting over.
+//! Stores snapshots of a replay in memory, so that playback can jump back without starting again.
 //!
 //! Snapshots are cut into blocks by content, and each distinct block is stored once. Consecutive snapshots share most
-//! of their state, since it describes wall that the vehicle has passed.
+//! blocks, because most of their state describes wall that the vehicle has already passed.
 
 mod blocks;
 
@@ -11,40 +11,40 @@ use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
-/// Snapshots by time, within a fixed amount of memory.
+/// Snapshots by time, within a limited amount of memory.
 #[derive(Debug)]
 pub struct SnapshotStore {
     snapshots: BTreeMap<MonoNs, Vec<Arc<[u8]>>>,
-    /// The distinct blocks of all snapshots.
+    /// Distinct blocks of all snapshots.
     blocks: BTreeSet<Arc<[u8]>>,
-    /// Memory of the blocks and the references to them, bytes.
+    /// Memory of the blocks and of the references to them, bytes.
     used_bytes: usize,
     max_bytes: usize,
     interval: Duration,
 }
 
 impl SnapshotStore {
-    /// Creates an empty store for at most `max_bytes` of snapshots, each due after `interval` of work.
+    /// Creates an empty store for at most `max_bytes`. A snapshot is due after each `interval` of work.
     ///
-    /// The first snapshot is kept whatever its size.
+    /// The first snapshot is kept, whatever its size is.
     pub fn new(max_bytes: usize, interval: Duration) -> Self {
         Self { snapshots: BTreeMap::new(), blocks: BTreeSet::new(), used_bytes: 0, max_bytes, interval }
     }
 
-    /// Work between two snapshots. It doubles each time the store is full.
+    /// Returns the work between two snapshots. It doubles each time the store is full.
     pub fn interval(&self) -> Duration {
         self.interval
     }
 
-    /// Time of the latest snapshot not after `at`.
+    /// Returns the time of the latest snapshot that isn't later than `at`.
     pub fn latest(&self, at: MonoNs) -> Option<MonoNs> {
         self.snapshots.range(..=at).next_back().map(|(time, _)| *time)
     }
 
-    /// Adds a snapshot, unless one of that time exists.
+    /// Adds a snapshot, unless the store has one of the same time.
     ///
-    /// If there is no room, every other snapshot is dropped and the interval doubled until there is. A snapshot that
-    /// doesn't fit beside the first one isn't kept.
+    /// While there is no room, every other snapshot is dropped and the interval is doubled. A snapshot that doesn't
+    /// fit beside the first one isn't kept.
     pub fn insert(&mut self, at: MonoNs, snapshot: &[u8]) {
         if self.snapshots.contains_key(&at) {
             return;
@@ -66,12 +66,12 @@ impl SnapshotStore {
         self.used_bytes += references;
     }
 
-    /// The bytes of a snapshot at a time returned by [`SnapshotStore::latest`].
+    /// Returns the bytes of the snapshot with this time, which [`SnapshotStore::latest`] has returned.
     pub fn load(&self, at: MonoNs) -> Option<Vec<u8>> {
         self.snapshots.get(&at).map(|blocks| blocks.concat())
     }
 
-    /// Memory needed for the blocks that aren't stored yet, bytes.
+    /// Returns the memory needed for blocks that aren't stored yet, bytes.
     fn growth(&self, blocks: &BTreeSet<&[u8]>) -> usize {
         blocks.iter().filter(|block| !self.blocks.contains(**block)).map(|block| block_bytes(block)).sum()
     }
@@ -86,14 +86,14 @@ impl SnapshotStore {
         held
     }
 
-    /// Drops every other snapshot after the first, and the blocks no longer used.
+    /// Drops every other snapshot, beginning with the second, and all blocks that are no longer used.
     fn thin(&mut self) {
         let mut is_kept = false;
         self.snapshots.retain(|_, _| {
             is_kept = !is_kept;
             is_kept
         });
-        // The set itself holds one reference.
+        // The set itself holds one reference to each block.
         self.blocks.retain(|block| Arc::strong_count(block) > 1);
         let blocks: usize = self.blocks.iter().map(|block| block_bytes(block)).sum();
         let references: usize = self.snapshots.values().map(Vec::len).sum();
@@ -101,7 +101,7 @@ impl SnapshotStore {
     }
 }
 
-/// Memory of a block: its bytes, its two reference counts, its set entry.
+/// Returns the memory of a block: its bytes, its two reference counts, and its entry in the set.
 fn block_bytes(block: &[u8]) -> usize {
     block.len() + 2 * size_of::<usize>() + size_of::<Arc<[u8]>>()
 }
@@ -112,7 +112,7 @@ mod tests {
 
     const INTERVAL: Duration = Duration::from_millis(300);
 
-    /// Incompressible bytes, different for each seed.
+    /// Returns incompressible bytes that depend on the seed.
     fn noise(len: usize, seed: u64) -> Vec<u8> {
         let mut state = seed;
         let mut next = || {
@@ -136,13 +136,13 @@ mod tests {
         for at in times {
             assert_eq!(store.load(MonoNs(at)).unwrap(), snapshot(at));
         }
-        // Each thinning made room for half as many snapshots again.
+        // The interval doubled at least three times: each thinning makes room for only half as many new snapshots.
         assert!(store.interval() > 4 * INTERVAL);
         assert_eq!(store.load(MonoNs(1)), None);
     }
 
     #[test]
-    fn snapshots_share_the_blocks_that_they_have_in_common() {
+    fn snapshots_share_equal_blocks() {
         let mut store = SnapshotStore::new(16 << 20, INTERVAL);
         let wall = noise(4 << 20, 1);
         for number in 0..100_u64 {

@@ -1,4 +1,4 @@
-//! Coverage judgements for viewers: section verdicts, missed stretches, and alerts to the pilot.
+//! Coverage judgements for viewers: verdicts of sections, missed stretches, and alerts to the pilot.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,11 @@ use headrace_monitor::pilot_text::{CauseFigures, Missed as MissedText, cause_tex
 use super::messages::{Level, Log, Missed, Section, Stretch, rounded};
 use super::site::Site;
 
-/// Interval at which the list of missed stretches is shown, if changed.
+/// Minimum interval between lists of missed stretches.
 const EVERY: DurNs = DurNs(2_000_000_000);
-/// Maximum number of stretches listed. The last ones along the tunnel are kept. A dive that misses everything still has a
-/// small log.
+/// Maximum number of stretches in a list; the last ones along the tunnel are kept.
+///
+/// The log stays small even if a dive misses everything.
 const MOST_STRETCHES: usize = 40;
 
 /// A judgement of a section, as published.
@@ -29,26 +30,28 @@ pub(super) struct Judged {
     pub(super) cause: Option<CauseFigures>,
 }
 
-/// Judgements so far.
+/// Judgements of all sections so far.
 #[derive(Debug, Default)]
 pub(super) struct Sections {
-    /// Flagged sections with the cause and the hole.
+    /// Flagged sections, each with its cause and the diameter of its hole, m.
     flagged: BTreeMap<i64, (Cause, f64)>,
-    /// First and last section of each run.
+    /// First and last section of each missed run.
     runs: BTreeMap<u64, (i64, i64)>,
-    /// Changed runs. The pilot is alerted with the next judgement, which is that of the section that changed them.
+    /// Runs that have changed, each with its change.
+    ///
+    /// The next judgement is that of the section that changed them. It creates the alert to the pilot.
     changed_runs: Vec<(u64, u64)>,
     shown: Option<MonoNs>,
     changed: bool,
 }
 
 impl Sections {
-    /// Records the change of a run.
+    /// Notes the change of a run.
     pub(super) fn run(&mut self, id: u64, change: u64) {
         self.changed_runs.push((id, change));
     }
 
-    /// Processes a section's judgement. Returns the section as shown, and the alerts to the pilot.
+    /// Processes the judgement of a section. Returns the section for display, and the alerts to the pilot.
     ///
     /// `v_max_mps` is the advised speed.
     pub(super) fn judge(&mut self, judged: &Judged, site: &Site, v_max_mps: f64) -> (Section, Vec<Log>) {
@@ -71,13 +74,13 @@ impl Sections {
         (shown(judged, flagged, site), said)
     }
 
-    /// Creates the alert to the pilot about a run that a section changed.
+    /// Creates the alert to the pilot about a changed run.
     fn say(&mut self, id: u64, change: u64, judged: &Judged, site: &Site, v_max_mps: f64) -> Option<Log> {
         let index = judged.section;
         let span = self.runs.entry(id).or_insert((index, index));
         if change == RunChange::Cleared as u64 {
             let (from, to) = self.runs.remove(&id)?;
-            // Part of the range may belong to another run now.
+            // A part of the cleared range may now belong to another run, which is still missed.
             let open = self.flagged.range(from..=to).next().is_some();
             let words = cleared_text(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
             return (!open).then(|| Log::new(judged.at, Level::Info, words));
@@ -97,12 +100,12 @@ impl Sections {
         })
     }
 
-    /// Makes the next update due at once.
+    /// Makes the next list due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }
 
-    /// The missed stretches, if they changed and an update is due.
+    /// Returns the list of missed stretches, if it has changed and is due.
     pub(super) fn show(&mut self, at: MonoNs, site: &Site) -> Option<Missed> {
         let waits = self.shown.is_some_and(|shown| (0..EVERY.0).contains(&at.since(shown).0));
         (self.changed && !waits).then(|| {
@@ -112,7 +115,7 @@ impl Sections {
         })
     }
 
-    /// Adjacent flagged sections with the same cause, along the tunnel.
+    /// Returns the missed stretches. A stretch is adjacent flagged sections with the same cause.
     fn stretches(&self, site: &Site) -> Vec<Stretch> {
         let mut stretches: Vec<Stretch> = Vec::new();
         let mut last = None;

@@ -1,11 +1,11 @@
-//! Messages for viewers: JSON with the keys of Foxglove's schemas and of this program's own schemas.
+//! Messages for viewers, in JSON. The keys are those of Foxglove's schemas, or of this program's own schemas.
 //!
-//! Numbers are rounded to display precision to keep the text short.
+//! Numbers are rounded to display precision, which keeps the text short.
 
 use headrace_geometry::time::MonoNs;
 use serde::Serialize;
 
-/// A time in Foxglove's format, on the host's monotonic clock like all times in a log.
+/// A time in Foxglove's format, on the host's monotonic clock, as all times in a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(super) struct Time {
     sec: u64,
@@ -27,7 +27,7 @@ pub(super) struct Xyz {
 }
 
 impl Xyz {
-    /// Rounded to a tenth of a millimetre.
+    /// Creates a position, rounded to a tenth of a millimetre.
     pub(super) fn new([x, y, z]: [f64; 3]) -> Self {
         Self { x: rounded(x, 1e4), y: rounded(y, 1e4), z: rounded(z, 1e4) }
     }
@@ -43,10 +43,10 @@ pub(super) struct Turn {
 }
 
 impl Turn {
-    /// Identity: the frames coincide.
+    /// The identity, for frames that coincide.
     pub(super) const NONE: Self = Self { x: 0.0, y: 0.0, z: 0.0, w: 1.0 };
 
-    /// Rounded to a microradian.
+    /// Creates a quaternion, rounded to a microradian.
     pub(super) fn of_wxyz(wxyz: [f64; 4]) -> Self {
         let [w, x, y, z] = wxyz.map(|part| rounded(part, 1e6));
         Self { x, y, z, w }
@@ -80,7 +80,7 @@ pub(super) struct PoseInFrame {
     pub(super) pose: Pose,
 }
 
-/// A field of a packed element, by number of Foxglove's `NumericType`.
+/// A field of a packed element. The type is a number of Foxglove's `NumericType`.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Field {
     name: &'static str,
@@ -130,7 +130,7 @@ pub(super) struct Grid {
     pub(super) data: String,
 }
 
-/// Severity of a log line, by number of Foxglove's `LogLevel`.
+/// Severity of a log line. The values are numbers of Foxglove's `LogLevel`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
     Info = 2,
@@ -154,7 +154,7 @@ impl Log {
     }
 }
 
-/// The vehicle, for plots. Unknown values are omitted: viewers' schema parsers don't support null.
+/// State of the vehicle, for plots. Unknown values are left out, because viewers' schema parsers don't support null.
 #[derive(Debug, Serialize)]
 pub(super) struct Vehicle {
     pub(super) timestamp: Time,
@@ -196,7 +196,7 @@ pub(super) struct Section {
     pub(super) hole_clock: String,
     pub(super) target_m: f64,
     pub(super) flagged: bool,
-    /// Cause; empty unless the section is flagged or fails.
+    /// Cause of the failure; empty unless the section is flagged or fails.
     pub(super) cause: &'static str,
     pub(super) words: String,
 }
@@ -227,12 +227,12 @@ pub(super) struct Advice {
     pub(super) words: String,
 }
 
-/// Rounds to 1 / `parts`. Non-finite values become zero, since JSON can't represent them.
+/// Rounds to 1 / `parts`. Non-finite values become zero, because JSON can't represent them.
 pub(super) fn rounded(value: f64, parts: f64) -> f64 {
     if value.is_finite() { (value * parts).round() / parts + 0.0 } else { 0.0 }
 }
 
-/// Bytes in base64. Source: RFC 4648, section 4.
+/// Encodes bytes in base64. Source: RFC 4648, section 4.
 pub(super) fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let digit = |bits: u32| DIGITS.get((bits & 63) as usize).map_or('=', |digit| char::from(*digit));
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn times_and_numbers_are_short() {
+    fn times_and_numbers_are_serialised_briefly() {
         let json = |value: &dyn erased::Json| value.json();
         assert_eq!(json(&Time::from(MonoNs(12_000_000_034))), r#"{"sec":12,"nsec":34}"#);
         assert_eq!(json(&Xyz::new([1.0 / 3.0, -0.000_01, f64::NAN])), r#"{"x":0.3333,"y":0.0,"z":0.0}"#);

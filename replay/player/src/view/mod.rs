@@ -1,12 +1,12 @@
 //! Converts the loop's results ([`headrace_monitor::result_stream`]) to messages that Foxglove and Lichtblick display.
 //!
-//! Schemas are Foxglove's and some of this program's own.
+//! The schemas are Foxglove's or this program's own.
 //!
 //! | topic below `/result/view/` | schema | content, rate |
 //! |---|---|---|
 //! | `transforms` | `foxglove.FrameTransforms` | `tunnel` to `vehicle` and to `wall`, at each update (5 Hz) |
 //! | `pose` | `foxglove.PoseInFrame` | the vehicle, at each update |
-//! | `vehicle` | `headrace.Vehicle` | the same for plots, with speed and standard deviations |
+//! | `vehicle` | `headrace.Vehicle` | state of the vehicle for plots, with speed and standard deviations |
 //! | `points` | `foxglove.PointCloud` | samples of half a second, with the head number |
 //! | `wall` | `foxglove.Grid` | the unrolled wall within 8 m of the vehicle, every 2 s |
 //! | `sections` | `headrace.Section` | each section as it is judged |
@@ -17,7 +17,7 @@
 //! Frame `tunnel` is the one of [`headrace_geometry::frames`]. Its z axis points up, as viewers expect, so nothing
 //! needs rotating. Frame `wall` lies flat beside it: x is chainage, y is arc length.
 //!
-//! The recorder's thread makes the messages ([`DerivedChannels`]), not the loop. A replay reads none of them.
+//! The messages are created by the recorder's thread ([`DerivedChannels`]), not by the loop. A replay doesn't read them.
 
 mod judged;
 mod messages;
@@ -56,14 +56,14 @@ use crate::results::{STREAMS, read_results};
 pub use schemas::channels;
 pub use site::Site;
 
-/// Distance at which the wall is shown beside the tunnel, m.
+/// Distance between the tunnel and the wall displayed beside it, m.
 const BESIDE_M: f64 = 1.0;
 /// Interval at which unchanged advice is repeated.
 const ADVICE_EVERY: DurNs = DurNs(1_000_000_000);
-/// Speeds that differ by less than this count as the same advice, m/s.
+/// Speeds that differ by less than this count as equal advice, m/s.
 const SAME_MPS: f64 = 0.005;
 
-/// Makes viewer messages from the loop's results.
+/// Creates messages for viewers from the loop's results.
 #[derive(Debug)]
 pub struct View {
     site: Site,
@@ -71,14 +71,14 @@ pub struct View {
     points: Points,
     wall: Wall,
     sections: Sections,
-    /// Chainage and speed of the last known position.
+    /// Chainage, m, and speed, m/s, at the last known position.
     last: Option<(f64, f64)>,
     v_max_mps: f64,
     told: Option<LastAdvice>,
     at: MonoNs,
 }
 
-/// The advice last shown.
+/// The advice that was published last.
 #[derive(Debug)]
 struct LastAdvice {
     at: MonoNs,
@@ -88,7 +88,7 @@ struct LastAdvice {
 }
 
 impl View {
-    /// Creates the view of a dive without results so far.
+    /// Creates the view of a dive that has no results yet.
     pub fn new(site: Site) -> Self {
         let steps = 64;
         let arcs = (0..steps).map(|step| f64::from(step) / f64::from(steps) * site.profile.perimeter_m());
@@ -120,7 +120,7 @@ impl View {
             }
             RecordKind::Alert => self.alert(&mut words, made),
             RecordKind::Advice => self.advice(&mut words, made),
-            // Viewers show samples only. Doubtful returns, the live state and the list of alerts remain in the log's
+            // Viewers get only samples. Doubtful returns, live states and the list of alerts are in the log's
             // results.
             RecordKind::NoSample
             | RecordKind::Doubtful
@@ -184,7 +184,7 @@ impl View {
         Some(())
     }
 
-    /// Periodic messages.
+    /// Publishes the messages that are due from time to time.
     fn beat(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
         self.at = at;
         made.push_some(Topic::Points, self.points.close_before(at).as_ref());
@@ -291,7 +291,7 @@ impl View {
         Some(())
     }
 
-    /// Creates an alert about the dive as a whole or about a head.
+    /// Publishes an alert about the dive as a whole, or about a head.
     fn alert(&self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
         let at = MonoNs(words.integer()?);
         let kind = words.one_of(&AlertKind::ALL, |kind| kind as u64)?;
@@ -313,7 +313,7 @@ impl DerivedChannels for View {
         let mut rest = words.as_slice();
         while let Some((record, after)) = first_record(rest) {
             rest = after;
-            // Records in another version's format aren't shown.
+            // Records in the format of another version are skipped.
             let _ = self.record(record, &mut made);
         }
         self.at = at;
@@ -323,7 +323,7 @@ impl DerivedChannels for View {
         let at = self.at;
         let mut made = Outbox { at, made };
         made.push_some(Topic::Points, self.points.close().as_ref());
-        // The final state is always shown.
+        // The last update is always published.
         self.wall.hurry();
         self.sections.hurry();
         if let Some((x_m, _)) = self.last {
@@ -333,9 +333,9 @@ impl DerivedChannels for View {
     }
 }
 
-/// Output of messages.
+/// Collects messages for the log.
 struct Outbox<'a> {
-    /// Log time of the messages: that of the results they are made from, so that log times don't go back.
+    /// Log time of the messages. It is that of the results they come from, so that log times don't go back.
     at: MonoNs,
     made: &'a mut Vec<Made>,
 }
@@ -354,7 +354,7 @@ impl Outbox<'_> {
     }
 }
 
-/// A record's words, read in order.
+/// Words of a record, read in order.
 struct Words<'a>(&'a [u64]);
 
 impl Words<'_> {
@@ -374,7 +374,7 @@ impl Words<'_> {
         Some(first.map(f64::from_bits))
     }
 
-    /// The element of `all` whose number is the next word.
+    /// Returns the element of `all` whose number is the next word.
     fn one_of<T: Copy>(&mut self, all: &[T], number: impl Fn(T) -> u64) -> Option<T> {
         let word = self.integer()?;
         all.iter().copied().find(|kind| number(*kind) == word)

@@ -1,39 +1,43 @@
-//! Collects samples into point clouds of half a second each.
+//! Collects samples into point clouds of half a second.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::messages::{Field, PointCloud, Pose, Turn, Xyz, base64, rounded};
 use super::site::TUNNEL;
 
-/// Time span of a cloud.
+/// Maximum time span of a cloud.
 const SPAN: DurNs = DurNs(500_000_000);
-/// Maximum number of points of a cloud.
+/// Maximum number of points in a cloud.
 const MOST_POINTS: usize = 4096;
-/// Bytes per point: three floats.
+/// Length of a point, bytes: three floats.
 ///
-/// The head number is stored in the least significant byte of x, which rounding has set to zero. A viewer that reads it
-/// as part of x is off by some micrometres. A stride that isn't a multiple of three would compress a seventh worse in
-/// base64.
+/// The least significant byte of x holds the head number; rounding has made that byte zero. A viewer that reads it as
+/// part of x is wrong by some micrometres. A fourth field would make the stride no multiple of three, which
+/// compresses a seventh worse in base64.
 const STRIDE: usize = 12;
 const FIELDS: [Field; 4] =
     [Field::float("x", 0), Field::float("y", 4), Field::float("z", 8), Field::byte("head", 0)];
-/// Coordinates are rounded to 1 / this, m (4 mm), which is finer than the samples' accuracy. The lower half of a
-/// float's bits is then zero and compresses well.
+/// Steps per metre to which coordinates are rounded. A step of 4 mm is finer than the samples' accuracy.
+///
+/// The lower half of each float is then zero and compresses well.
 const PARTS_PER_M: f64 = 256.0;
-/// Greatest distance of a point from its cloud's origin, m. Points beyond have fewer zero bits and aren't shown.
+/// Maximum distance of a point from the cloud's origin, m. Farther points would have fewer zero bits, and are
+/// dropped.
 const FARTHEST_M: f64 = 128.0;
 
 /// Points of the current cloud.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     began: Option<MonoNs>,
-    /// Chainage of the cloud's origin, m. A float is too coarse for a chainage of seven kilometres.
+    /// Chainage of the cloud's origin, m. Points are relative to it, because a float is too coarse for seven
+    /// kilometres.
     origin_m: f64,
     data: Vec<u8>,
 }
 
 impl Points {
-    /// Adds a head's sample, received at `at`. Returns the previous cloud if it was full or too old for the sample.
+    /// Adds a sample of a head, received at `at`. Returns the previous cloud if it was full or too old for the
+    /// sample.
     pub(super) fn add(&mut self, at: MonoNs, head: u8, [x_m, y_m, z_m]: [f64; 3]) -> Option<PointCloud> {
         let full = if self.data.len() >= MOST_POINTS * STRIDE { self.close() } else { self.close_before(at) };
         if self.began.is_none() {
@@ -48,13 +52,13 @@ impl Points {
         full
     }
 
-    /// Returns the cloud if it is too old at `at`, or the clock was set back.
+    /// Returns the current cloud if it is too old at `at`, or the clock was set back.
     pub(super) fn close_before(&mut self, at: MonoNs) -> Option<PointCloud> {
         let age = at.since(self.began?).0;
         if (0..SPAN.0).contains(&age) { None } else { self.close() }
     }
 
-    /// Returns the current cloud.
+    /// Returns the current cloud, and begins another.
     pub(super) fn close(&mut self) -> Option<PointCloud> {
         let began = self.began.take()?;
         let data = base64(&self.data);

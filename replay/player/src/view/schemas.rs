@@ -1,8 +1,8 @@
-//! The channels of a view and their schemas.
+//! The channels of a view, and their schemas.
 //!
 //! Names and keys of `foxglove.*` are those of Foxglove's published JSON Schemas (docs.foxglove.dev, "Message
-//! schemas"). Only features that viewers' schema parsers support are used: `type` is one word, and there are no
-//! references and no null. Enumerations state their type beside the names, which some parsers require and others
+//! schemas"). Only features that viewers' schema parsers support are used. `type` is one word, and there are no
+//! references and no null. Enumerations state their type beside their names, which some parsers require and others
 //! ignore.
 
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ use super::topic::Topic;
 use crate::log::ResultChannel;
 use crate::log::format::VIEW_PREFIX;
 
-/// The channels of a view. Their numbers follow those of the result streams.
+/// Returns the channels of a view. Their numbers follow those of the result streams.
 pub fn channels() -> Vec<ResultChannel> {
     let channel = |topic: &Topic| {
         let (name, schema_name, schema) = schema_of(*topic);
@@ -21,14 +21,15 @@ pub fn channels() -> Vec<ResultChannel> {
             schema_encoding: "jsonschema".to_owned(),
             schema: titled(schema_name, schema).to_string(),
             message_encoding: "json".to_owned(),
-            // It can be recomputed from the rest of the log, so it is dropped first when the disk fills.
+            // Viewer messages can be computed again from the rest of the log, so they are dropped first when the disk
+            // fills.
             follows_echoes: true,
         }
     };
     Topic::ALL.iter().map(channel).collect()
 }
 
-/// Returns a topic's name, the name of its schema, and the schema.
+/// Returns the name of a topic, the name of its schema, and the schema.
 fn schema_of(topic: Topic) -> (&'static str, &'static str, Value) {
     match topic {
         Topic::Transforms => ("transforms", "foxglove.FrameTransforms", transforms()),
@@ -43,14 +44,14 @@ fn schema_of(topic: Topic) -> (&'static str, &'static str, Value) {
     }
 }
 
-/// Schema of an object whose keys are all required except `optional`.
+/// Returns the schema of an object. All keys except `optional` are required.
 fn object(properties: &Value, optional: &[&str]) -> Value {
     let keys = properties.as_object().into_iter().flat_map(|properties| properties.keys());
     let required: Vec<&String> = keys.filter(|key| !optional.contains(&key.as_str())).collect();
     json!({"type": "object", "required": required, "properties": properties})
 }
 
-/// The same schema under a title.
+/// Returns the same schema with a title.
 fn titled(title: &str, mut schema: Value) -> Value {
     if let Some(schema) = schema.as_object_mut() {
         schema.insert("title".to_owned(), title.into());
@@ -100,7 +101,7 @@ fn list(items: &Value) -> Value {
     json!({"type": "array", "items": items})
 }
 
-/// Enumeration schema: names for consecutive numbers from `first`.
+/// Returns the schema of an enumeration, with names for consecutive numbers from `first`.
 fn names(first: u32, names: &[&str]) -> Value {
     let named: Vec<Value> =
         (first..).zip(names).map(|(number, name)| json!({"title": name, "const": number})).collect();

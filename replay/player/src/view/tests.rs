@@ -23,7 +23,7 @@ fn record(kind: RecordKind, words: &[u64]) -> Vec<u64> {
     [&[(words.len() as u64) << 8 | kind as u64], words].concat()
 }
 
-/// The messages made from records of a stream, by topic name.
+/// Returns the messages that the view creates from records of a stream, by topic.
 fn taken(view: &mut View, stream: &str, at: u64, records: &[Vec<u64>]) -> BTreeMap<String, Vec<Value>> {
     let words = [&[0, 0], records.concat().as_slice()].concat();
     let message: Vec<u8> = words.into_iter().flat_map(u64::to_le_bytes).collect();
@@ -57,7 +57,7 @@ fn sample(at: u64, source: u64, place: [f64; 4]) -> Vec<u64> {
     record(RecordKind::Sample, &[&[at, source, 0], bits(place).as_slice()].concat())
 }
 
-/// A section's judgement with a cause.
+/// Returns a section's judgement with a cause.
 fn section(at: u64, index: i64, change: Judgement, verdict: Verdict) -> Vec<u64> {
     let head = [at, index.cast_unsigned(), change as u64, verdict as u64];
     let tail = bits([10.1, 9.4, 0.3, 0.2, 0.2, 0.0, 0.0]);
@@ -66,7 +66,7 @@ fn section(at: u64, index: i64, change: Judgement, verdict: Verdict) -> Vec<u64>
 }
 
 #[test]
-fn pose_becomes_transform_pose_and_plot_figures() {
+fn pose_is_published_as_transform_pose_and_vehicle_state() {
     let mut view = view();
     let made = taken(&mut view, "poses", 7, &[pose(1_200_000_000, 12.345_678)]);
     let transforms = made["transforms"][0]["transforms"].as_array().unwrap();
@@ -88,7 +88,7 @@ fn pose_becomes_transform_pose_and_plot_figures() {
 }
 
 #[test]
-fn samples_become_clouds_of_half_a_second() {
+fn samples_are_published_as_clouds_of_half_a_second() {
     let mut view = view();
     let ms = |ms: u64| ms * 1_000_000;
     let samples: Vec<_> = (0..12)
@@ -98,7 +98,7 @@ fn samples_become_clouds_of_half_a_second() {
     let clouds = &made["points"];
     assert_eq!(clouds.len(), 2, "the third is being gathered");
     assert_eq!(clouds[0]["pose"]["position"]["x"], 6900.0);
-    // Of five points: x = 0.25 with the head's number in its lowest byte, y = 1, z = -2.5.
+    // The five points alternate between two heads: x = 0.25 with the head number in its lowest byte, y = 1, z = -2.5.
     let point = |head: u8| [[head, 0, 0x80, 0x3e], 1_f32.to_le_bytes(), (-2.5_f32).to_le_bytes()].concat();
     let expected = [point(0), point(1), point(0), point(1), point(0)].concat();
     assert_eq!(clouds[0]["data"], messages::base64(&expected));
@@ -108,7 +108,7 @@ fn samples_become_clouds_of_half_a_second() {
 }
 
 #[test]
-fn the_wall_shows_samples_and_verdicts_near_the_vehicle() {
+fn wall_grid_covers_samples_and_verdicts_near_the_vehicle() {
     let mut view = view();
     taken(&mut view, "pings", 1, &[sample(1, 2, [10.1, 0.0, 0.0, 9.4]), sample(1, 2, [1e9, 0.0, 0.0, 1.0])]);
     taken(&mut view, "judgements", 1, &[section(1, 40, Judgement::Raised, Verdict::Fail)]);
@@ -123,7 +123,7 @@ fn the_wall_shows_samples_and_verdicts_near_the_vehicle() {
 }
 
 #[test]
-fn flags_and_clearings_are_alerted_once_in_pilot_words() {
+fn raised_and_cleared_runs_give_one_alert_each() {
     let mut view = view();
     let run = |change: RunChange| record(RecordKind::Run, &[0, change as u64]);
     let raised = [run(RunChange::Raised), section(1, 40, Judgement::Raised, Verdict::Fail)];
@@ -147,7 +147,7 @@ fn flags_and_clearings_are_alerted_once_in_pilot_words() {
     let none = [run(RunChange::Cleared), section(5, 41, Judgement::Cleared, Verdict::Pass)];
     let made = taken(&mut view, "judgements", 5, &none);
     assert_eq!(made["alerts"][0]["message"], "cleared  ch 0+010.00 to 0+010.50");
-    assert_eq!(made["sections"][0]["cause"], "", "what passes has no cause");
+    assert_eq!(made["sections"][0]["cause"], "", "a section that passes has no cause");
 }
 
 fn advice(at: u64, v_max_mps: f64, will_exceed: bool) -> Vec<u64> {
@@ -168,7 +168,7 @@ fn advice_is_published_on_change_and_every_second() {
     assert_eq!((&made["alerts"][0]["level"], &made["advice"][0]["speed_mps"]), (&3.into(), &0.2.into()));
 }
 
-/// Viewers' JSON schema parsers support only a single word for `type`, and no references.
+/// Viewers' schema parsers support only a single word for `type`, and no references.
 #[test]
 fn schemas_use_only_features_that_viewers_support() {
     fn look(schema: &Value, place: &str) {
@@ -195,7 +195,7 @@ fn schemas_use_only_features_that_viewers_support() {
 }
 
 #[test]
-fn invalid_words_show_nothing() {
+fn invalid_records_are_not_published() {
     let mut view = view();
     for kind in 0..=255_u64 {
         for len in 0..20_u64 {

@@ -15,7 +15,7 @@ pub(super) enum Topic {
 }
 
 impl Topic {
-    /// All, in the order of their channels.
+    /// All topics, in the order of their channels.
     pub(super) const ALL: [Self; 9] = [
         Self::Transforms,
         Self::Pose,

@@ -1,4 +1,4 @@
-//! The unrolled wall near the vehicle: chainage along x, arc length along y, samples and verdicts as colours.
+//! The unrolled wall near the vehicle: chainage along x, arc length along y. Colours show samples and verdicts.
 
 use std::collections::BTreeMap;
 
@@ -9,13 +9,13 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use super::messages::{Field, Grid, Pose, Turn, Xy, Xyz, base64, rounded};
 use super::site::{Site, WALL};
 
-/// Approximate height of a cell along the perimeter, m.
+/// Approximate size of a cell along the perimeter, m.
 const CELL_M: f64 = 0.25;
-/// Distance shown ahead and astern of the vehicle, m.
+/// Length of wall displayed ahead of the vehicle, and behind it, m.
 const REACH_M: f64 = 8.0;
-/// Length of the sections kept beyond either end of the tunnel, m: heads may be there.
+/// Length of wall kept beyond either end of the tunnel, m, because heads may be there.
 const BEYOND_M: f64 = 25.0;
-/// Interval at which the wall is shown, if changed.
+/// Minimum interval between grids.
 const EVERY: DurNs = DurNs(2_000_000_000);
 const FIELDS: [Field; 6] = [
     Field::byte("red", 0),
@@ -25,10 +25,10 @@ const FIELDS: [Field; 6] = [
     Field::byte("samples", 4),
     Field::byte("verdict", 5),
 ];
-/// Largest sample count shown per cell: exact counts would dominate the message size.
+/// Maximum sample count of a cell. Exact counts would take most of the message.
 const MOST_SAMPLES: u8 = 3;
 
-/// Samples and verdicts per cell; allocated only for the passed part of the tunnel.
+/// Samples and verdicts of the wall's cells. Columns are allocated only where the vehicle has passed.
 #[derive(Debug)]
 pub(super) struct Wall {
     cells: usize,
@@ -62,7 +62,7 @@ impl Wall {
         }
     }
 
-    /// Counts a sample.
+    /// Counts a sample in its cell.
     pub(super) fn sample(&mut self, x_m: f64, arc_m: f64) {
         let row = usize::try_from(math::floor_to_i64(arc_m / self.cell_m)).unwrap_or(0).min(self.cells - 1);
         let column = self.column(math::floor_to_i64(x_m / self.section_m));
@@ -74,7 +74,7 @@ impl Wall {
         }
     }
 
-    /// Stores a section's verdict.
+    /// Stores the verdict of a section.
     pub(super) fn judge(&mut self, section: i64, verdict: Verdict) {
         if let Some(column) = self.column(section)
             && column.verdict != verdict
@@ -90,12 +90,12 @@ impl Wall {
         self.indices.contains(&index).then(|| self.columns.entry(index).or_insert_with(new))
     }
 
-    /// Makes the next update due at once.
+    /// Makes the next grid due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }
 
-    /// The wall around a chainage, if it changed and an update is due.
+    /// Returns the wall around a chainage, if it has changed and a grid is due.
     pub(super) fn show(&mut self, at: MonoNs, x_m: f64) -> Option<Grid> {
         let waits = self.shown.is_some_and(|shown| (0..EVERY.0).contains(&at.since(shown).0));
         (self.changed && !waits).then(|| {
@@ -129,9 +129,9 @@ impl Wall {
     }
 }
 
-/// Colour, samples and verdict of a cell.
+/// Returns the colour, sample count and verdict of a cell.
 ///
-/// A cell without a sample is transparent in an open section and dark in a judged one, so that holes show.
+/// A cell without a sample is transparent in an open section, and dark in a judged one, so that holes are visible.
 fn cell(column: Option<&Column>, row: usize) -> [u8; FIELDS.len()] {
     let Some(column) = column else { return [0; FIELDS.len()] };
     let samples = column.samples.get(row).copied().unwrap_or(0);

@@ -1,4 +1,4 @@
-// Alerts that are active or need an acknowledgement, the most urgent first.
+// Lists alerts that are active or need an acknowledgement, the most urgent first.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { acknowledge, silence } from "../feed/client";
 import type { Alert } from "../feed/types";
@@ -9,16 +9,17 @@ import { span } from "../text/format";
 import { actions } from "../wall/control";
 import { SoundButtons } from "./SoundButtons";
 
-/** Number of alerts in the list; hidden and further ones are counted. */
+/** Maximum number of alerts in the list. Hidden alerts and those beyond this number are only counted. */
 const SHOWN = 64;
-/** In a longer list, all but the first two take one line each until they have the focus. */
+/** In a list longer than this, each alert after the second takes one line until it has the focus. */
 const ROOMY = 6;
 
 export function Alerts() {
   useTopics(store.topics.alerts, store.topics.hello);
   const list = sorted(store.alerts.values());
   const waiting = list.filter(isUnacknowledged).length;
-  // Alerts that the program counts beyond its list may be here, if they were raised since the page was opened.
+  // The program's count of hidden alerts may include some that this page has received, if they were raised after the
+  // page was opened.
   const all = Math.max(list.length, store.alertsHidden > 0 ? SHOWN + store.alertsHidden : 0);
   const hidden = all - Math.min(list.length, SHOWN);
   const may = store.hello?.may.operate ?? false;
@@ -84,7 +85,7 @@ function Since({ alert }: { alert: Alert }) {
   return <span class="since">{now === undefined ? "" : `${span(now - alert.since_s)} ago`}</span>;
 }
 
-/** Announces new alerts to a screen reader, alarms at once. */
+/** Announces new alerts to a screen reader, alarms without delay. */
 export function AlertAnnouncer() {
   useTopics(store.topics.alerts);
   const newest = sorted(store.alerts.values()).find((alert) => isUnacknowledged(alert) && alert.state === "active");

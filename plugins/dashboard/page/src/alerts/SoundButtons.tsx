@@ -1,4 +1,4 @@
-// Sound and speech: on, off, muted by class.
+// Buttons that switch sound and speech on and off, and mute classes of alerts.
 import { CLASSES } from "../store/alerts";
 import { prefs, prefsTopic, setPrefs } from "../store/prefs";
 import { useTopics } from "../store/topic";

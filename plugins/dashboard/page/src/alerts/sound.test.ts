@@ -8,7 +8,7 @@ const alert = (over: Partial<Alert>): Alert => ({
   from_m: null, to_m: null, back_to_m: null, at_most_mps: null, sensor: null, count: 1, ...over,
 });
 
-it("gravest active alert sounds, and silenced, muted, acknowledged or cleared ones do not", () => {
+it("the most severe active alert sounds; silenced, muted, acknowledged and cleared alerts do not", () => {
   expect(sounding([alert({}), alert({ priority: "alarm", class: "coverage" })], [])).toBe("alarm");
   expect(sounding([alert({}), alert({ priority: "alarm", class: "coverage" })], ["coverage"])).toBe("warning");
   expect(sounding([alert({ sounds: false })], [])).toBeNull();

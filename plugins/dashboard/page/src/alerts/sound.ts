@@ -1,6 +1,7 @@
-// Sounds of alerts by WebAudio. An alarm: three short high notes every 4 s. A warning: two long low ones every 12 s. An emergency
-// alarm: high and low without a pause. Silenced and muted alerts make no sound; the loop states which ones sound.
-// emergency alarm: high and low without a pause. Silenced and muted ones don't sound; the loop says which sound.
+// Sounds of alerts by WebAudio.
+// Emergency alarm: high and low tones without a pause. Alarm: three short high tones every 4 s. Warning: two long low
+// tones every 12 s.
+// Silenced and muted alerts make no sound. The loop decides which other alerts sound.
 import type { Alert, Priority } from "../feed/types";
 import { isOld } from "../store/age";
 import { isUnacknowledged } from "../store/alerts";
@@ -25,7 +26,7 @@ let playing: Priority | null = null;
 /** Whether the browser allows sound, which it does only after a user action. */
 export const isAudible = (): boolean => context?.state === "running";
 
-/** Must be called from a click or key. */
+/** Enables sound. Browsers allow this only in the handler of a click or key. */
 export function unlock(): void {
   try {
     context ??= new AudioContext();
@@ -35,7 +36,7 @@ export function unlock(): void {
   void context.resume().then(() => soundTopic.changed());
 }
 
-/** Priority that sounds now; null for none. */
+/** Priority of the alert that sounds now; null if none sounds. */
 export function sounding(alerts: Iterable<Alert>, muted: readonly string[]): Exclude<Priority, "caution"> | null {
   const found = new Set<Priority>();
   for (const alert of alerts) {
@@ -46,7 +47,7 @@ export function sounding(alerts: Iterable<Alert>, muted: readonly string[]): Exc
 }
 
 function beat(): void {
-  // Old data may no longer be true: it is displayed, but its sound stops.
+  // Old data is still displayed but makes no sound, because it may no longer be true.
   const now = prefs.sound && store.link.phase !== "file" && !isOld(store) ? sounding(store.alerts.values(), prefs.muted) : null;
   if (now !== playing) {
     playing = now;

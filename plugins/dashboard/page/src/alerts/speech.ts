@@ -1,4 +1,5 @@
-// Speaks alerts if the viewer wants it. The newest one wins, outdated speech is stopped, and nothing is repeated.
+// Speaks alerts if the viewer has enabled speech. A new alert interrupts the speech of an older one. Nothing is
+// repeated.
 import { prefs, prefsTopic } from "../store/prefs";
 import { isUnacknowledged } from "../store/alerts";
 import { store } from "../store/store";

@@ -1,4 +1,5 @@
-// Binary frames of the feed and of /samples, little-endian: byte kind, byte version, u16 0, u32 count, u64 seq, records.
+// Decodes binary frames of the feed and of /samples, little-endian: byte kind, byte version, u16 0, u32 count, u64
+// seq, records.
 
 export const HEADER_BYTES = 16;
 export const SECTION_BYTES = 32;
@@ -9,7 +10,7 @@ export const KIND_SAMPLES = 2;
 
 export interface Frame { kind: number; count: number; seq: number; view: DataView }
 
-/** Reads a frame's header; the records stay in place. */
+/** Reads a frame's header. The records are not copied. */
 export function frameOf(bytes: ArrayBuffer, at = 0, length = bytes.byteLength - at): Frame {
   if (length < HEADER_BYTES) throw new Error(`binary frame of ${length} bytes is shorter than its header of ${HEADER_BYTES}`);
   const head = new DataView(bytes, at, HEADER_BYTES);

@@ -6,7 +6,7 @@ import { Feed } from "./feed";
 import { embedded, entryAt, readDive, stateAt, type Dive } from "./file";
 import type { Command } from "./types";
 
-/** Samples of a file that the cross-section shows before a time: two turns of slow heads. */
+/** Time span before the displayed time whose samples the cross-section of a file shows: two turns of a slow head. */
 const TURNS_MS = 20_000;
 
 let feed: Feed | null = null;
@@ -51,7 +51,7 @@ export const silence = (): boolean => send({ do: "silence", by: prefs.by });
 export const note = (text: string): boolean => send({ do: "note", text, by: prefs.by });
 export const beginVoice = (id: number, by: string): boolean => send({ do: "voice", id, by });
 
-/** Sends the recording of a voice note. Throws the program's reason of a refusal. */
+/** Sends the recording of a voice note. If the program refuses it, throws the reason. */
 export async function sendVoice(id: number, seconds: number, sound: Blob): Promise<void> {
   const url = new URL(`/voice/${id}`, location.href);
   url.searchParams.set("seconds", String(seconds));
@@ -62,7 +62,7 @@ export async function sendVoice(id: number, seconds: number, sound: Blob): Promi
   throw new Error(answer?.why ?? `the program answered ${response.status}`);
 }
 
-/** The recording of a voice note, from the program or the file. Throws the reason if there is none. */
+/** Returns the recording of a voice note, from the program or the file. Throws the reason if it has none. */
 export async function voiceOf(id: number): Promise<Blob> {
   if (dive) {
     const sound = dive.voices.get(id);
@@ -74,7 +74,7 @@ export async function voiceOf(id: number): Promise<Blob> {
   return response.blob();
 }
 
-/** The file's dive at a time. */
+/** Displays the dive in the file at a given time. */
 export function seekFile(at_s: number): void {
   if (!dive) return;
   entry = entryAt(dive.t_s, at_s);
@@ -96,7 +96,7 @@ export function stepFile(by: number): void {
   if (dive) seekFile(dive.t_s[Math.min(Math.max(entry + by, 0), dive.t_s.length - 1)] ?? 0);
 }
 
-/** Samples between two chainages, from the program or the file, and the thinning step. */
+/** Returns the samples between two chainages, from the program or the file, and the thinning step. */
 export async function samples(from_m: number, to_m: number, signal: AbortSignal): Promise<{ frame: Frame; oneOf: number }> {
   if (dive) return { frame: fromFile(dive, from_m, to_m), oneOf: store.hello?.thinned ? 2 : 1 };
   const url = new URL("/samples", location.href);
@@ -114,7 +114,7 @@ function fromFile(dive: Dive, from_m: number, to_m: number): Frame {
   });
 }
 
-/** A range of a file's samples as a frame. */
+/** Returns the selected samples of a file as a frame. */
 function chosen({ samples }: Dive, choose: (view: DataView, at: number) => boolean): Frame {
   const records: Uint8Array[] = [];
   for (const { view, count } of samples) {

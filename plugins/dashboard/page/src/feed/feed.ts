@@ -1,4 +1,4 @@
-// The WebSocket to the program: connects, resumes after a drop, and backs off while nothing answers.
+// The WebSocket connection to the program. It resumes after a drop, and backs off while the program does not answer.
 import type { Store } from "../store/store";
 import { frameOf } from "./binary";
 import type { Command, Message } from "./types";
@@ -38,7 +38,7 @@ export class Feed {
     return true;
   }
 
-  /** Sends the token; returns the reason of a refusal, or nothing. The server stores it as a cookie. */
+  /** Sends the token, which the server stores as a cookie. Returns the reason of a refusal, or an empty text. */
   async login(token: string): Promise<string> {
     const url = new URL("/login", this.base);
     url.searchParams.set("token", token);
@@ -98,7 +98,7 @@ export class Feed {
     }
   }
 
-  /** A socket that can't be opened gives no reason, so the state's address is queried. */
+  /** A socket that can't be opened gives no reason, so /state.json is requested to find out whether a token is needed. */
   private async closed(reason: string): Promise<void> {
     const opened = this.store.link.phase === "open";
     this.lost(reason);
@@ -110,7 +110,7 @@ export class Feed {
         this.phase("refused", "");
       }
     } catch {
-      // No answer at all, so the connection is tried again.
+      // The program does not answer at all, so the timer's next attempt stays scheduled.
     }
   }
 

@@ -1,4 +1,5 @@
-// A dive in the page's own file: base64 of deflate-raw of frames (u32 length, u8 0 text | 1 binary, bytes).
+// Reads a dive that is embedded in the page's own file: base64 of deflate-raw of frames (u32 length, u8 0 text | 1
+// binary, bytes).
 import type { Store } from "../store/store";
 import { frameOf, KIND_SAMPLES, type Frame } from "./binary";
 import type { Message, State } from "./types";
@@ -62,7 +63,7 @@ export async function readDive(base64: string, store: Store): Promise<Dive> {
   return dive;
 }
 
-/** State at an entry of the timeline. Constant parts are in the first entry, and parts missing in an entry are in earlier ones. */
+/** State at an entry of the timeline. The first entry is complete. A later entry has only the fields that differ from the first. */
 export function stateAt(dive: Dive, entry: number): State | null {
   const whole: Partial<State> = {};
   const first = dive.states[0];
@@ -80,7 +81,7 @@ const EMPTY: Omit<State, "type"> = {
   sensors: [], metres: { pass_m: 0, fail_m: 0, cannot_say_m: 0, open_m: 0, not_inspected_m: 0, way_m: 0 }, cannot_say: null,
 };
 
-/** Entry of the timeline at or before a time. */
+/** Finds the last entry of the timeline at or before a time. */
 export function entryAt(t_s: number[], at_s: number): number {
   let low = 0, high = t_s.length - 1;
   while (low < high) {

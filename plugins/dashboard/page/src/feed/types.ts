@@ -1,4 +1,4 @@
-// Messages of the feed, as the server names them. Lengths in metres, times in seconds on the log's clock.
+// Types of the feed's messages, with the server's names. Lengths are in metres, times in seconds on the log's clock.
 
 export type Mode = "live" | "demo" | "replay" | "file";
 export type Lamp = "green" | "amber" | "red";
@@ -40,7 +40,7 @@ export interface State {
   turn: Turn | null;
   sensors: Sensor[];
   metres: { pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number; way_m: number };
-  /** Verdicts of the same dive for the second target of the hello. */
+  /** Verdicts of the same dive for the second target, which the hello states. */
   compared?: { target_m: number; pass_m: number; fail_m: number; cannot_say_m: number; open_m: number };
   cannot_say: { why: string; from_m: number; to_m: number } | null;
   /** Whether the replay has reached its end, or the dive has ended. */
@@ -69,7 +69,7 @@ export interface Alert {
 
 export interface Note {
   number: number; at_s: number; by: string; text: string; chainage_m: number | null; station: string | null;
-  /** For a voice note; without seconds its recording isn't in the log. */
+  /** Set for a voice note. `seconds` is null if the log has no recording of it. */
   voice?: { id: number; seconds: number | null } | null;
 }
 export interface Leg { from_m: number; to_m: number; at_most_mps: number | null; why: string }

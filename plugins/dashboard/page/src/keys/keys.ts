@@ -1,4 +1,4 @@
-// Every action has a key. `?` shows them.
+// Keys of all actions. The key `?` lists them.
 import { acknowledge, note, reconnect, silence } from "../feed/client";
 import { toggleSound } from "../alerts/SoundButtons";
 import { play } from "../replay/Replay";
@@ -78,7 +78,7 @@ export function startKeys(): void {
     const target = event.target as HTMLElement;
     const typing = /^(TEXTAREA|SELECT)$/.test(target.tagName) || (target.tagName === "INPUT" && !/^(checkbox|button)$/.test((target as HTMLInputElement).type));
     if (typing || document.querySelector("dialog[open]:not(.help)")) return;
-    // A button keeps its own keys, and so does a list that scrolls.
+    // A focused button keeps Space and Enter, and a focused list keeps the arrow keys that scroll it.
     if ((event.key === " " || event.key === "Enter") && /^(BUTTON|SUMMARY|INPUT|A)$/.test(target.tagName)) return;
     if (/^Arrow(Up|Down)$/.test(event.key) && target.tagName === "OL") return;
     const key = KEYS.find(({ keys }) => keys.includes(event.key)) ?? KEYS.find(({ keys }) => event.key.length === 1 && keys.includes(event.key.toLowerCase()) && event.key !== "A");

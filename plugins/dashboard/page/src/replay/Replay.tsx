@@ -1,4 +1,4 @@
-// Pause, speed, steps and a slider over time: for a replay, a demo, and a dive in a file.
+// Playback controls of a replay, a demo, or a dive in a file: pause, speed, steps and a time slider.
 import { seekFile, send, stepFile } from "../feed/client";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";

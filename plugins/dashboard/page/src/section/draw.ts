@@ -1,4 +1,4 @@
-// The cross-section, looking inwards: left is the tunnel's left.
+// Draws the cross-section, seen looking inwards: the tunnel's left is on the left.
 import type { Store } from "../store/store";
 import type { Return } from "../store/turns";
 import { figure } from "../text/format";
@@ -69,7 +69,7 @@ export function pointAt(points: [number, number][], share: number): [number, num
   return [y0 + (y1 - y0) * part, z0 + (z1 - z0) * part];
 }
 
-/** Angles that the vehicle hides from a head: 0 down, growing to the left, with the vehicle's roll. */
+/** Draws the angles that the vehicle hides from a head. They count from down towards the left, and turn with the vehicle's roll. */
 function hidden({ context, x, y, scale }: Frame, ranges: [number, number][], pose: Pose, reach_m: number): void {
   context.fillStyle = colour("hidden");
   context.globalAlpha = 0.3;
@@ -109,7 +109,7 @@ function returns({ context, x, y }: Frame, list: Return[], present: boolean): vo
   }
 }
 
-/** Last aim of a head. */
+/** Draws the last aim of a head. */
 function direction(frame: Frame, pose: Pose, latest: Return, head: number, points: [number, number][]): void {
   const { context, x, y } = frame;
   const [py, pz] = latest.outcome === 2 || Number.isNaN(latest.y_m) ? pointAt(points, latest.arc) : [latest.y_m, latest.z_m];
@@ -155,7 +155,7 @@ function vehicle(frame: Frame, pose: Pose): void {
   const w = Math.max(VEHICLE[0] * scale, 12), h = Math.max(VEHICLE[1] * scale, 8);
   context.save();
   context.translate(x(pose.y_m), y(pose.z_m));
-  // Positive roll raises the left side, as in a right-handed frame with x inwards.
+  // Positive roll raises the vehicle's left side, because the frame is right-handed with x inwards.
   context.rotate((pose.roll_deg * Math.PI) / 180);
   context.fillStyle = colour("vehicle");
   context.strokeStyle = colour("panel");

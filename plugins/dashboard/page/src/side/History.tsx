@@ -1,4 +1,4 @@
-// Speed and its limit over the last half hour.
+// Chart of the speed and its limit over the last half hour.
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";

@@ -1,4 +1,4 @@
-// Length by verdict, the remaining length, and the way back for missed stretches.
+// Lengths by verdict, the remaining length, and directions for going back to missed stretches.
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure, metres, span, station } from "../text/format";
@@ -38,7 +38,7 @@ export function Metres() {
   );
 }
 
-/** The same for the second target of a replay. */
+/** Lengths by verdict for the second target of a replay. */
 function Compared() {
   const other = store.state?.compared;
   if (!other) return null;

@@ -1,4 +1,4 @@
-// Notes, written or spoken at a position. N writes one at the present position, T records one.
+// Text and voice notes, each at a position. The key N writes a note at the present position, T records one.
 import { useEffect, useRef } from "preact/hooks";
 import { note } from "../feed/client";
 import { store } from "../store/store";
@@ -12,7 +12,7 @@ import { actions } from "../wall/control";
 const MOST_BYTES = 240;
 let show: (() => void) | null = null;
 
-/** Focuses the field at once, so that typing goes into it. */
+/** Focuses the field at once, so that typed text goes into it. */
 export function openNote(): void {
   show?.();
 }

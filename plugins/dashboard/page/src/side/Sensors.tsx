@@ -1,4 +1,4 @@
-// A lamp for every sensor: state in words, rate, age. Ages grow while no data arrive.
+// A lamp for every sensor, with its state in words, its rate and its age. The age grows while no data arrive.
 import { OLD_AFTER_S, sinceState_s } from "../store/age";
 import type { Sensor } from "../feed/types";
 import { store } from "../store/store";
@@ -17,7 +17,7 @@ export function Sensors() {
       <ul>
         {inOrder(state?.sensors ?? []).map((sensor) => {
           const age = sensor.age_s === null ? null : sensor.age_s + since;
-          // Without a connection to the program, the state of its sensors is unknown.
+          // The state of the sensors is unknown while there is no connection to the program.
           const is = since > OLD_AFTER_S ? "unknown" : sensor.state;
           const lamp = is === "ok" ? "green" : is === "unknown" ? "none" : is === "stalled" || is === "distrusted" ? "amber" : "red";
           const hz = state?.rates?.find((rate) => rate.id === sensor.id)?.hz;
@@ -37,7 +37,7 @@ export function Sensors() {
   );
 }
 
-/** Sensors with trouble come first, so that they are never below the edge. */
+/** Sensors with trouble come first, so that they are always visible. */
 function inOrder(sensors: Sensor[]): Sensor[] {
   return [...sensors.filter(({ state }) => state !== "ok"), ...sensors.filter(({ state }) => state === "ok")];
 }

@@ -1,4 +1,4 @@
-// The condition, the speed, its limit and the reason, readable for a pilot at two metres.
+// The condition, the speed, and its limit with the reason. A pilot can read them from two metres away.
 import type { Condition } from "../feed/types";
 import { shown, age_s, isOld } from "../store/age";
 import { store } from "../store/store";
@@ -22,7 +22,7 @@ export function Condition() {
   );
 }
 
-/** Announces the condition when it changes, without the counting seconds. */
+/** Announces the condition when it changes. The running count of seconds is left out. */
 export function Announcer() {
   useTopics(store.topics.state, store.topics.link, store.topics.clock);
   const { word, advice } = shown(store);

@@ -1,9 +1,9 @@
-// Positions on the speed gauge; pure functions for tests.
+// Positions on the speed gauge, as pure functions that tests can call.
 
-/** Excess over v_max that counts as too fast, as in the loop's conditions. */
+/** Ratio of speed to v_max above which the speed counts as too fast, as in the loop's conditions. */
 export const TOO_FAST = 1.05;
 
-/** End of the scale, m/s: v_max is at about two thirds, and the speed still fits. */
+/** End of the scale, m/s. It leaves v_max at about two thirds of the scale, and includes the speed. */
 export function scaleEnd(speed_mps: number | null, v_max_mps: number | null): number {
   const need = Math.max((v_max_mps ?? 0) * 1.5, Math.abs(speed_mps ?? 0) * 1.1, 0.1);
   const steps = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1, 1.5, 2, 3, 5];

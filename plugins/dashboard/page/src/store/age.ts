@@ -1,9 +1,9 @@
-// Age of the displayed data, and its text.
+// Age of the displayed data, and text about the age.
 import { conditionWords, type Shown } from "../text/words";
 import { span } from "../text/format";
 import type { Store } from "./store";
 
-/** Older data is displayed as old, as in the loop. */
+/** Data older than this is displayed as old, as in the loop. */
 export const OLD_AFTER_S = 2;
 
 /** Whether time is paused on purpose, so that displayed data doesn't age. */
@@ -25,7 +25,7 @@ export function sinceState_s(store: Store): number {
 export function age_s(store: Store): number | null {
   const { state } = store;
   if (!state || state.age_s === null) return null;
-  // The loop's own age counts only if it says that it is old, because a replay's updates can be far apart in time.
+  // The loop's age is that at the state's arrival, so the time since then is added.
   return state.age_s + sinceState_s(store);
 }
 
@@ -34,14 +34,14 @@ export function isOld(store: Store): boolean {
   return store.state !== null && (store.state.old || (age !== null && age > OLD_AFTER_S) || sinceState_s(store) > OLD_AFTER_S);
 }
 
-/** Seconds without data; null while the connection is up. */
+/** Seconds since the connection was lost; null while it is up. */
 export function lost_s(store: Store): number | null {
   const { phase, heard_ms, since_ms } = store.link;
   if (phase === "open" || phase === "file") return null;
   return (performance.now() - (heard_ms || since_ms)) / 1000;
 }
 
-/** Displayed condition. */
+/** The condition as displayed. */
 export function shown(store: Store): Shown {
   const { state, link } = store;
   const lost = lost_s(store);

@@ -1,9 +1,9 @@
-// Order and kinds of alerts by IMO MSC.302(87).
+// Order and kinds of alerts, as IMO MSC.302(87) defines them.
 import type { Alert, Priority } from "../feed/types";
 
 export const isUnacknowledged = (alert: Alert): boolean => alert.needs_acknowledgement && alert.acknowledged === null;
 
-/** Rank in lists; the least is the most urgent. */
+/** Rank of an alert in lists; the lowest rank is the most urgent. */
 export function rank(alert: Alert): number {
   const unacknowledged = isUnacknowledged(alert);
   if (alert.state === "active" && unacknowledged) {

@@ -1,4 +1,4 @@
-// Settings of this viewer, stored by the browser if it stores anything.
+// Settings of this viewer, kept in the browser's storage if it allows any.
 import type { AlertClass } from "../feed/types";
 import { Topic } from "./topic";
 
@@ -26,13 +26,13 @@ export function setPrefs(change: Partial<Prefs>): void {
   try {
     localStorage.setItem(KEY, JSON.stringify(prefs));
   } catch {
-    // The browser stores nothing, so the setting lasts until the page is closed.
+    // Without storage in the browser, the setting lasts until the page is closed.
   }
   document.documentElement.dataset["palette"] = prefs.palette;
   prefsTopic.changed();
 }
 
-/** At most 16 bytes, the limit of the loop. */
+/** Shortens a viewer's name to 16 bytes, the limit of the loop. */
 export function initials(text: string): string {
   let cut = text.trim();
   while (new TextEncoder().encode(cut).length > 16) cut = cut.slice(0, -1);

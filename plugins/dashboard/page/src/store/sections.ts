@@ -1,10 +1,10 @@
-// The wall's sections by index, in columns that grow in both directions.
+// The wall's sections by index, in arrays that grow in both directions.
 import { SECTION_BYTES, type Frame } from "../feed/binary";
 
 export const OPEN = 0, PASS = 1, FAIL = 2, CANNOT_SAY = 3, NOT_INSPECTED = 4;
 export const NONE = 255;
 export const FLAGGED = 1;
-/** Target of a section's verdict: the dive's own, or the second one of a comparison. */
+/** Target that a verdict refers to: the dive's own target, or the second target of a comparison. */
 export type Held = "own" | "compared";
 
 export class Sections {
@@ -14,7 +14,7 @@ export class Sections {
   /** Least and greatest index received; least > most if there is none. */
   least = Infinity;
   most = -Infinity;
-  /** 255 if nothing has been received. */
+  /** Verdict of each slot; 255 if nothing has been received for it. */
   verdict = new Uint8Array(0);
   cause = new Uint8Array(0);
   why = new Uint8Array(0);
@@ -33,7 +33,7 @@ export class Sections {
     this.resize(0, 0);
   }
 
-  /** Slot of an index, or -1. */
+  /** Slot of a section's index, or -1 if nothing has been received for it. */
   slot(index: number): number {
     const slot = index - this.base;
     return slot >= 0 && slot < this.slots && this.verdict[slot] !== NONE ? slot : -1;
@@ -44,7 +44,7 @@ export class Sections {
     return held === "own" ? (this.verdict[slot] ?? OPEN) : Math.max(((this.flags[slot] ?? 0) >> 2) - 1, OPEN);
   }
 
-  /** Whether a slot has the outline of missed sections. */
+  /** Whether a slot is outlined as a missed section. */
   isFlagged(slot: number, held: Held): boolean {
     return held === "own" ? ((this.flags[slot] ?? 0) & FLAGGED) !== 0 : this.verdictOf(slot, held) === FAIL;
   }
@@ -58,7 +58,7 @@ export class Sections {
       if (index < least) least = index;
       if (index > most) most = index;
     }
-    // 200 km of sections of 0.05 m; a frame with more is invalid and would take all memory.
+    // 4,000,000 sections of 0.05 m are 200 km. A frame that spans more is invalid and would exhaust the memory.
     if (most - least > 4_000_000) throw new Error(`sections from ${least} to ${most} in one frame`);
     this.reach(least, most);
     for (let at = 0; at < count * SECTION_BYTES; at += SECTION_BYTES) {

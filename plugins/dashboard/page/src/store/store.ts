@@ -1,4 +1,5 @@
-// All data of the page: the content of the feed, by subject, each with a topic. Nothing is computed here except order.
+// All data of the page: the feed's content, with a topic for each subject. The page computes nothing except the order
+// of items.
 import { KIND_SECTIONS, type Frame } from "../feed/binary";
 import type { Alert, Back, Hello, History, Message, Note, State, Told } from "../feed/types";
 import { Sections } from "./sections";
@@ -25,14 +26,14 @@ export type SampleListener = (frame: Frame) => void;
 export class Store {
   hello: Hello | null = null;
   state: State | null = null;
-  /** Time at which the state arrived, performance.now(); its age counts from there. */
+  /** Time at which the state arrived, performance.now(). The state's age counts from then on. */
   state_ms = 0;
   seq = 0;
-  /** All data has arrived since the last hello. */
+  /** Whether all data has arrived since the last hello. */
   ready = false;
   /** Number of connections so far. */
   session = 0;
-  /** All data has arrived once, so that later losses can be requested. */
+  /** Whether all data has arrived once, so that a later connection needs only the changes. */
   private known = false;
   end: { digest?: string; exit?: number } | null = null;
   alerts = new Map<number, Alert>();
@@ -44,7 +45,7 @@ export class Store {
   readonly sections = new Sections();
   readonly turns = new Turns();
   readonly link: Link = { phase: "connecting", since_ms: 0, heard_ms: 0, tries: 0, why: "" };
-  /** Answer to a command, for the status line. */
+  /** Answer to the last command, for the status line. */
   answer: { text: string; refused: boolean; at_ms: number } | null = null;
 
   readonly topics = {
@@ -114,7 +115,7 @@ export class Store {
     this.topics.answer.changed();
   }
 
-  /** Instance to resume with; empty if there is nothing to resume. */
+  /** Instance whose feed a new connection resumes; empty if there is nothing to resume. */
   get instance(): string {
     return this.known ? (this.hello?.instance ?? "") : "";
   }
@@ -149,7 +150,7 @@ export class Store {
       this.alertsHidden = state.alerts_hidden;
       this.topics.alerts.changed();
     }
-    // After a jump back, later samples are no longer valid.
+    // Samples that arrived before a jump back in time are later than the new time, and so no longer valid.
     if (before && state.now_s < before.now_s - 1) {
       if (this.link.phase !== "file") this.turns.clear();
       this.end = null;

@@ -1,4 +1,5 @@
-// A value that changes, with its subscribers. Components are notified once a frame, however many changes there were.
+// A value that changes, with its subscribers. Subscribers are notified once per animation frame, however often the
+// value changes.
 import { useEffect, useReducer } from "preact/hooks";
 
 const due = new Set<Topic>();
@@ -23,7 +24,7 @@ export class Topic {
     due.add(this);
     if (scheduled) return;
     scheduled = true;
-    // Hidden pages get no frames, but sounds must go on there.
+    // A hidden page gets no animation frames, but its sounds must continue.
     if (document.hidden) setTimeout(tell, 50);
     else requestAnimationFrame(tell);
   }
@@ -38,16 +39,16 @@ export class Topic {
   }
 }
 
-/** Renders the component again when any of these changes. */
+/** Renders the component again when any of these topics changes. */
 export function useTopics(...topics: Topic[]): void {
   const [, again] = useReducer((count: number) => count + 1, 0);
   const seen = topics.map((topic) => topic.version).join();
   useEffect(() => {
     const listener = () => again(undefined);
     const offs = topics.map((topic) => topic.on(listener));
-    // Changes between rendering and now.
+    // A topic may have changed between rendering and this effect.
     if (topics.map((topic) => topic.version).join() !== seen) listener();
     return () => offs.forEach((off) => off());
-    // Topics are constants of the page.
+    // No dependencies: a component's topics never change.
   }, []);
 }

@@ -7,7 +7,7 @@ describe("turns of a head", () => {
   it("end after a full turn, also across the seam", () => {
     const turns = new HeadTurns();
     for (let n = 0; n <= 150; n += 1) turns.take(at(n * 0.05, 0.7 + n / 100));
-    // Returns 0 to 99 in the first turn, later ones in the second.
+    // Returns 0 to 99 belong to the first turn, later returns to the second.
     expect(turns.last.length).toBe(100);
     expect(turns.present.length).toBe(51);
     expect(turns.present[0]?.t_s).toBeCloseTo(5);
@@ -22,7 +22,7 @@ describe("turns of a head", () => {
     expect(turns.last.length).toBeGreaterThan(30);
     expect(turns.present.length).toBeLessThan(10);
   });
-  it("start over after a jump in time", () => {
+  it("begin again after a jump in time", () => {
     const turns = new HeadTurns();
     for (let n = 0; n < 10; n += 1) turns.take(at(100 + n, n / 100));
     turns.take(at(20, 0.5));

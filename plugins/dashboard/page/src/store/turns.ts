@@ -1,11 +1,12 @@
-// Returns of each head in its present turn and the last one. A turn ends after 360 degrees, or when the head reverses.
+// Returns of each head in the present turn and the one before. A turn ends after 360 degrees, or when the head
+// reverses.
 import { SAMPLE_BYTES, type Frame } from "../feed/binary";
 
 export interface Return { t_s: number; x_m: number; y_m: number; z_m: number; arc: number; outcome: number }
 
 /** Number of steps against the direction of a sweep that count as a reversal; fewer are jitter. */
 const REVERSED_STEPS = 4;
-/** A head with more returns than this in a turn has stopped turning. */
+/** A head with more returns than this in one turn has stopped turning. */
 const MOST_RETURNS = 4000;
 
 export class HeadTurns {
@@ -17,7 +18,7 @@ export class HeadTurns {
 
   take(next: Return): void {
     const before = this.present.at(-1);
-    // A jump in time (a seek or a gap) starts over.
+    // After a jump in time (a seek or a gap), both turns start again.
     if (before && (next.t_s < before.t_s || next.t_s > before.t_s + 60)) this.clear();
     else if (before) this.turn(next.arc - before.arc);
     this.present.push(next);

@@ -1,4 +1,4 @@
-// Formats numbers for people.
+// Formats numbers, lengths and times for people.
 
 /** Chainage in engineers' notation: 1+240 for 1240 m, with this many decimals. */
 export function station(chainage_m: number, decimals = 0): string {

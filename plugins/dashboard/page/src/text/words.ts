@@ -1,8 +1,8 @@
-// Texts of conditions, verdicts and reasons: the page's only table of them.
+// The page's only table of texts for conditions, verdicts and reasons.
 import type { Condition, Lamp, State } from "../feed/types";
 import { figure, span } from "./format";
 
-/** Displayed condition: the loop's, or that no data arrive from the loop. */
+/** The displayed condition: that of the loop, or a message that no data arrive from the loop. */
 export interface Shown { word: string; advice: string; lamp: Lamp; old: boolean }
 
 export const REASONS: Record<string, string> = {
@@ -28,7 +28,7 @@ export const SENSOR_STATES: Record<string, string> = {
   ok: "ok", silent: "silent", never: "no data yet", stalled: "doesn't turn", deaf: "detects no wall", hung: "stuck", distrusted: "not trusted",
 };
 
-/** Text of a cause or reason: too_fast is "too fast". */
+/** Text of a cause or reason: `too_fast` becomes "too fast". */
 export function plain(name: string): string {
   return name.replaceAll("_", " ");
 }
@@ -37,11 +37,12 @@ export function atMost(state: State): string {
   return state.v_max_mps === null ? "" : `at most ${figure(state.v_max_mps, 2)} m/s`;
 }
 
-/** Name and advice of a state's condition. */
+/** Name and advice for a state's condition. */
 export function conditionWords(state: State): { word: string; advice: string } {
   const most = atMost(state);
   const slower = most === "" ? "slower" : `slow to ${figure(state.v_max_mps, 2)} m/s`;
-  // Below v_max, heads apart along the hull that are out of phase miss wall, and going slower makes it worse.
+  // Heads that are mounted apart along the hull and turn out of phase can miss wall below v_max.
+  // Going slower would then make it worse, so the advice is v_max itself.
   const go = most === "" ? "" : `go ${figure(state.v_max_mps, 2)} m/s`;
   const stand = state.position.why === "spread" && state.position.stand_s > 0 ? `stand still ${state.position.stand_s} s` : most;
   const words: Record<Condition, [string, string]> = {

@@ -1,4 +1,4 @@
-// Shapes with the meaning of the colours: circle good, triangle caution, octagon stop.
+// Shapes that mean the same as the colours: circle for good, triangle for caution, octagon for stop.
 import type { Lamp } from "../feed/types";
 
 export function Shape({ lamp, size = 24 }: { lamp: Lamp | "none"; size?: number }) {

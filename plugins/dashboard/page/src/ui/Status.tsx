@@ -1,4 +1,4 @@
-// The line at the bottom: dive, connection, answers to commands, palette and keys.
+// The status line at the bottom: dive, connection, answers to commands, palette and keys.
 import { PALETTES, prefs, prefsTopic, setPrefs } from "../store/prefs";
 import { lost_s } from "../store/age";
 import { store } from "../store/store";

@@ -1,4 +1,4 @@
-// Colours of the palette for canvases, read from the style sheet, so that there is one table for both.
+// Colours of the palette for canvases. They are read from the style sheet, so that only one table of colours exists.
 import { prefsTopic } from "../store/prefs";
 
 let cache = new Map<string, string>();

@@ -1,4 +1,4 @@
-// The button that records a voice note, with its messages.
+// The button that records a voice note, and its messages.
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { clock } from "../text/format";
@@ -26,7 +26,7 @@ export function VoiceButton() {
   const lack = phase === "idle" ? lacks() : null;
   const past_s = (performance.now() - voice.since_ms) / 1000;
   const words = {
-    // A click shows the reason.
+    // The button stays enabled, because a click displays the reason.
     idle: lack === null ? "Voice" : "No voice", asking: "microphone…", recording: `End ${clock(past_s)}`, sending: "sending…", unsent: "Send again",
   }[phase];
   const title = lack ?? (phase === "idle" ? "Voice note at this place: tap, speak, tap; or hold (T)" : phase === "recording" ? `${words} of ${clock(MOST_S)} (T)` : words);

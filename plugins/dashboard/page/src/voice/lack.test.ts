@@ -9,7 +9,7 @@ describe("a voice note", () => {
     expect(lack({ ...here, connected: false })).toMatch(/not connected/);
     expect(lack({ ...here, operates: false })).toMatch(/viewing only/);
     expect(lack({ ...here, recorded: false })).toMatch(/isn't recorded/);
-    // By plain HTTP from another machine a browser can't ask for a microphone either.
+    // A page loaded over plain HTTP from another machine can't ask for a microphone either.
     expect(lack({ ...here, secure: false, asks: false, type: null })).toMatch(/https/);
     expect(lack({ ...here, type: null })).toMatch(/can't record sound/);
   });

@@ -1,9 +1,9 @@
-// Reasons why no voice note can be recorded, in words, and limits of recordings.
+// Texts for the reasons why no voice note can be recorded, and limits of recordings.
 
-/** Limits, as in the loop and the log. */
+/** Limits of a recording, the same as in the loop and the log. */
 export const MOST_S = 60;
 export const MOST_BYTES = 512 * 1024;
-/** Bit rate at which speech in Opus is clear; a minute has 180 kB. */
+/** Bit rate at which speech in Opus is clear. A minute takes 180 kB. */
 export const BITS_PER_S = 24_000;
 const TYPES = ["audio/webm;codecs=opus", "audio/ogg;codecs=opus", "audio/mp4"];
 
@@ -16,7 +16,7 @@ export interface Here {
   type: string | null;
 }
 
-/** The reason why not; null if a note can be recorded. */
+/** Reason why no voice note can be recorded; null if one can be. */
 export function lack(here: Here): string | null {
   if (!here.connected) return "no voice note now: not connected to the program";
   if (!here.operates) return "no voice notes: the dive doesn't accept them, or the token is for viewing only";
@@ -26,7 +26,7 @@ export function lack(here: Here): string | null {
   return null;
 }
 
-/** First type that the browser records and the log accepts. */
+/** First type that the browser can record and the log accepts. */
 export function recordable(supports: (type: string) => boolean): string | null {
   return TYPES.find(supports) ?? null;
 }
@@ -39,5 +39,5 @@ export function refusal(name: string): string {
   return `the microphone can't be opened: ${name}`;
 }
 
-/** Whole seconds of a recording, as displayed in the note. */
+/** Duration of a recording in whole seconds, as displayed in the note. */
 export const seconds = (ms: number): number => Math.min(MOST_S, Math.max(1, Math.round(ms / 1000)));

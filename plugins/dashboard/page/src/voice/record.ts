@@ -1,4 +1,4 @@
-// Records a voice note: the note is created when the recording begins, and its sound is sent when it ends.
+// Records a voice note. The note is created when the recording begins; the sound is sent when the recording ends.
 import { beginVoice, sendVoice } from "../feed/client";
 import { prefs } from "../store/prefs";
 import { store } from "../store/store";
@@ -37,7 +37,7 @@ export function lacks(): string | null {
   });
 }
 
-/** Begins or ends a recording, or sends one that couldn't be sent, whichever is next. */
+/** Takes the next step: begins or ends a recording, or sends one that could not be sent before. */
 export function next(): void {
   if (voice.phase === "idle") void begin();
   else if (voice.phase === "recording") end();
@@ -72,7 +72,7 @@ async function begin(): Promise<void> {
     recorder = null;
     return become("idle", `nothing can be recorded: ${String(error)}`);
   }
-  // From here on the note exists with its time and position, whatever happens to the sound.
+  // From here on the note exists with its time and position, even if its sound is lost.
   if (!beginVoice(id, prefs.by)) {
     recorder.onstop = () => stream.getTracks().forEach((track) => track.stop());
     recorder.stop();
@@ -119,7 +119,7 @@ export function startVoice(): void {
       voiceTopic.changed();
     }
   });
-  // A recording held back by a lost connection is sent as soon as there is one.
+  // A recording that a lost connection held back is sent as soon as the connection returns.
   store.topics.link.on(() => {
     if (unsent && voice.phase === "unsent" && store.link.phase === "open" && store.link.since_ms > unsent.failed_ms) void send();
   });

@@ -1,4 +1,4 @@
-// Legend of the wall's colours and marks.
+// Legend for the wall's colours and marks.
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure } from "../text/format";

@@ -1,4 +1,4 @@
-// The unrolled wall: a canvas for WebGL2, a canvas for labels, and the strip of the whole tunnel.
+// The unrolled wall: a WebGL2 canvas, a canvas for labels, and a strip that shows the whole tunnel.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { samples as fetchSamples } from "../feed/client";
 import { prefsTopic } from "../store/prefs";
@@ -18,7 +18,7 @@ import { left_m, right_m, roundOf, wholeView, type Round, type View } from "./vi
 const LEFT = 30, TOP = 8, BOTTOM = 24, STRIP = 34, STRIP_BOTTOM = 18;
 /** Gap between two walls, pixels. */
 const BETWEEN = 16;
-/** Least radius of a disc in pixels, and widest view, for drawing discs. */
+/** Minimum radius of a disc in pixels, and widest view in which discs are drawn. */
 const LEAST_RADIUS = 2.2, DISCS_UPTO_M = 160;
 
 function layoutOf({ width, height }: Size): Layout {
@@ -34,7 +34,7 @@ function wallColours(): WallColours {
   };
 }
 
-/** Everything that draws the wall, except components. */
+/** Draws the wall without the component framework. */
 class Painter {
   private size: Size = { width: 0, height: 0, scale: 1 };
   private readonly gl: WallGl;
@@ -82,7 +82,7 @@ class Painter {
     return { ...wholeView(current(), from, to), span_m: to - from };
   }
 
-  /** Draws once, at the next frame. */
+  /** Requests one drawing at the next frame. */
   draw(): void {
     if (this.asked !== 0) return;
     this.asked = requestAnimationFrame(() => {
@@ -101,7 +101,7 @@ class Painter {
     context.setTransform(scale, 0, 0, scale, 0, 0);
     context.clearRect(0, 0, width, height);
     if (!hello) return;
-    // Data that arrived without a connection isn't in the window.
+    // The window misses samples that were sent while the connection was lost, so a new connection clears it.
     if (this.session !== store.session) this.window.clear();
     this.session = store.session;
     this.round = roundOf(hello.clock_arc_m, hello.perimeter_m);
@@ -130,7 +130,7 @@ class Painter {
       width: Math.min(Math.round(this.layout.width * scale), this.wall.width - Math.round(this.layout.left * scale)), height: Math.round(height * scale),
     };
     const words = large ? this.words : this.stripWords;
-    // The strip of the whole tunnel changes only with the wall itself.
+    // The strip of the whole tunnel is computed again only when the wall or the strip's range changes.
     const key = large ? "" : `${store.topics.sections.version} ${left_m(view)} ${view.span_m} ${part.width}`;
     if (large || key !== this.stripKey) {
       columns(store.sections, hello.section_m, target_m, left_m(view), view.span_m / part.width, part.width, words, held);
@@ -159,7 +159,7 @@ class Painter {
     return { samples: this.window, radius_m: target_m / 2, perimeter_m: hello.perimeter_m, turn_t_s: this.turns };
   }
 
-  /** Text on the place under the pointer. */
+  /** Text about the place under the pointer. */
   at(x: number, y: number): string {
     const { hello, sections } = store, { left, top, width, height } = this.layout;
     if (!hello || x < left || y < top || y > top + height) return "";
@@ -169,7 +169,7 @@ class Painter {
     const row = this.rows(hello.target_m, hello.compared_m).find((each) => y <= each.top + each.height);
     const held = row?.held ?? "own", target_m = row?.target_m ?? hello.target_m;
     const verdict = ["open", "pass", "missed", "can't say", "not inspected"][sections.verdictOf(slot, held)] ?? "";
-    // Cause and reason belong to the dive's own target.
+    // Causes and reasons are known only for the dive's own target.
     const own = held === "own" ? slot : -1, cause = hello.causes[sections.cause[own] ?? 255], why = hello.whys[sections.why[own] ?? 255];
     const words = [cause, why].filter((word) => word !== undefined).map((word) => word.replaceAll("_", " ")).join(", ");
     const d = sections.hole[slot] ?? NaN;

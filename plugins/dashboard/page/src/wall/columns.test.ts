@@ -35,9 +35,10 @@ describe("columns of the wall", () => {
     expect(out[4]! & 7).toBe(PASS);
     expect(out[8]! & 7).toBe(ABSENT);
   });
-  it("judge the same samples by another target", () => {
+  it("show the verdict for the second target", () => {
     const sections = new Sections();
-    // One section passes by its own target and is missed by the other; one has no comparison.
+    // The first section passes for the dive's own target and fails for the second target. The second section has no
+    // comparison.
     sections.take(frame([{ index: 0, verdict: PASS, flags: 2 | ((FAIL + 1) << 2), hole: 0.4 }, { index: 1, verdict: PASS, flags: 2, hole: 0.4 }]));
     const own = new Uint32Array(2 * 4), other = new Uint32Array(2 * 4);
     columns(sections, 1, 0.5, 0, 1, 2, own);

@@ -1,11 +1,10 @@
-// One column of the wall for each horizontal pixel, made from the sections in it. 28,000 sections take less than a millisecond,
-// and only visible columns go to the graphics processor.
-// a millisecond, and only what the screen has columns for goes to the graphics processor.
+// Computes one column of the wall for each horizontal pixel, from the sections in that pixel.
+// 28,000 sections take less than a millisecond. Only visible columns go to the graphics processor.
 import { CANNOT_SAY, FAIL, NOT_INSPECTED, OPEN, PASS, type Held, type Sections } from "../store/sections";
 
 export const ABSENT = 7;
 export const FLAGGED_BIT = 8;
-/** Number of steps of D / T in a column's upper half. */
+/** Number of steps per unit of D / T, which is in the upper half of a column's first word. */
 export const RATIO_STEPS = 8192;
 /** Number of words in a column: state, seen low, seen high, none. */
 export const WORDS = 4;
@@ -52,7 +51,7 @@ export function columns(
   widen(out, count);
 }
 
-/** A flagged stretch narrower than three columns would be invisible. */
+/** Widens flagged stretches of fewer than three columns, which would be invisible otherwise. */
 function widen(out: Uint32Array, count: number): void {
   let run = 0;
   for (let column = 0; column <= count; column += 1) {
@@ -63,7 +62,7 @@ function widen(out: Uint32Array, count: number): void {
         const at = beside * WORDS;
         if (beside >= 0 && beside < count && ((out[at] ?? 0) & 7) !== ABSENT) out[at] = ((out[at] ?? 0) | FLAGGED_BIT) >>> 0;
       }
-      // The widened part isn't another run.
+      // Skips the column just added, so that it isn't widened in turn.
       run = 0;
       column += 1;
       continue;

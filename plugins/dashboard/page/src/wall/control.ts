@@ -1,4 +1,4 @@
-// The wall's view, changed by keys, wheel, pinch and buttons.
+// Changes the view of the wall, by keys, wheel, pinch and buttons.
 import { store } from "../store/store";
 import { Topic } from "../store/topic";
 import { FOLLOW_SPAN_M, followed, moved, movedDown, startView, wholeView, zoomed, zoomedDown, type View } from "./view";
@@ -37,7 +37,7 @@ export function vehicle(): { at_m: number; sd_m: number; direction: number; sure
   return { at_m: last_m, sd_m: state?.position.chainage_sd_m ?? 0, direction, sure: state?.position.state === "ok" };
 }
 
-/** The view as drawn: with the vehicle, if it follows. */
+/** The view as drawn, which moves with the vehicle if the view follows it. */
 export function current(): View {
   const its = vehicle();
   if (view.whole) return wholeView(view, ...whole());
@@ -52,7 +52,7 @@ export const actions = {
     const [from, to] = whole();
     const now = current();
     const next = zoomed(now, factor, at, to - from);
-    // A view that follows continues to follow.
+    // Zooming keeps a view that follows the vehicle on the vehicle.
     set(view.follow ? { ...next, follow: true } : next);
   },
   pan(share: number): void {

@@ -1,4 +1,4 @@
-// Draws the wall with WebGL2, only on request. Uploads the visible columns, and each sample once.
+// Draws the wall with WebGL2, only on request. It uploads only the visible columns, and each sample only once.
 import { rgb } from "./cividis";
 import { WORDS } from "./columns";
 import { FLOATS, type SampleWindow } from "./samples";
@@ -7,7 +7,7 @@ import type { Round, View } from "./view";
 
 export interface WallColours { blank: string; open: string; missed: string; flag: string; hatch: string; dot: string; fresh: string; gain: number }
 
-/** Part of the canvas, in device pixels from its lower left. */
+/** A part of the canvas, in device pixels from the canvas's lower left corner. */
 export interface Part { x: number; y: number; width: number; height: number }
 
 export interface Drawing {
@@ -18,7 +18,7 @@ export interface Drawing {
 /** Discs of a smaller radius, CSS pixels, are drawn as points. */
 const SMALL_DISC = 9;
 
-/** Rounds that are partly visible. */
+/** Repetitions of the perimeter that are at least partly visible. */
 function rounds({ centreDown, zoomDown }: View): number[] {
   const half = 0.5 / zoomDown;
   return [-1, 0, 1].filter((shift) => centreDown + half > shift + 1e-6 && centreDown - half < shift + 1 - 1e-6);
@@ -130,11 +130,12 @@ export class WallGl {
     this.use(program, drawing, colours);
     this.place(program, drawing);
     gl.uniform2f(program.at("u_radius"), across, down);
-    // A pixel covered by one disc isn't shaded again for the next.
+    // The depth test skips pixels that another disc already covers.
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LESS);
     gl.bindVertexArray(small ? this.points : this.instanced);
-    // The window has samples beside the seam twice, so other rounds are drawn only if the view extends beyond one.
+    // The window already holds samples near the seam twice.
+    // Further repetitions of the perimeter are drawn only if the view extends beyond one.
     for (const shift of rounds(view)) {
       gl.uniform1f(program.at("u_shift"), shift);
       if (small) gl.drawArrays(gl.POINTS, 0, discs.samples.count);
@@ -150,7 +151,7 @@ export class WallGl {
     this.place(this.dots, drawing);
     const radius = (discs.radius_m / drawing.view.span_m) * drawing.part.width;
     const down = (discs.radius_m / discs.perimeter_m) * drawing.part.height * drawing.view.zoomDown;
-    // From afar the dots would hide the discs.
+    // In a wide view the dots would hide the discs, so only dots of the present turn are drawn.
     gl.uniform1i(this.dots.at("u_all"), Math.min(radius, down) > 4 * drawing.scale ? 1 : 0);
     gl.uniform1f(this.dots.at("u_point"), Math.min(Math.max(radius / 6, 1), 3.5 * drawing.scale));
     gl.uniform1fv(this.dots.at("u_turn_t_s"), discs.turn_t_s);

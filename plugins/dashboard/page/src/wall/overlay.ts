@@ -1,4 +1,4 @@
-// Labels over the wall: stations, clock positions, holes, alerts, the vehicle.
+// Draws labels over the wall: stations, clock positions, holes, alerts and the vehicle.
 import { CANNOT_SAY, FAIL, type Held } from "../store/sections";
 import { isUnacknowledged } from "../store/alerts";
 import type { Store } from "../store/store";
@@ -8,7 +8,7 @@ import { downOf, heightOf, left_m, right_m, type Round, type View } from "./view
 
 /** Positions in CSS pixels. */
 export interface Layout { left: number; top: number; width: number; height: number; stripTop: number; stripHeight: number }
-/** One of the walls: the same samples, judged by one target. */
+/** One row of the display: the same samples, judged by one target. */
 export interface Row { held: Held; target_m: number; top: number; height: number }
 export interface Vehicle { at_m: number; sd_m: number; direction: number; sure: boolean }
 
@@ -35,7 +35,7 @@ export function drawOverlay(
   drawStrip(context, store, view, strip, layout, vehicle);
 }
 
-/** Target of a wall, in its upper corner. */
+/** Writes a row's target into its upper corner. */
 function named(context: CanvasRenderingContext2D, { left, top }: Layout, { target_m }: Row): void {
   context.font = `bold 15px ${FONT}`;
   context.textAlign = "left";
@@ -51,7 +51,7 @@ function clocks(context: CanvasRenderingContext2D, store: Store, view: View, lay
   if (!hello) return;
   context.textAlign = "right";
   const drawn: number[] = [];
-  // The quarters come first; without room, the hours between are left out.
+  // The labels of 12, 3, 6 and 9 are placed first. Labels of other hours are left out where there is no room.
   for (const hour of [0, 3, 6, 9, 1, 2, 4, 5, 7, 8, 10, 11]) {
     const down = downOf(round, (hello.clock_arc_m[hour] ?? 0) / hello.perimeter_m);
     for (const turn of [-1, 0, 1]) {
@@ -75,7 +75,7 @@ function clocks(context: CanvasRenderingContext2D, store: Store, view: View, lay
   }
 }
 
-/** Step of stations that are at least `least_m` apart: 1, 2, 5 and multiples of ten of these. */
+/** Spacing of station labels that are at least `least_m` apart: 1, 2 or 5 times a power of ten. */
 export function step_m(least_m: number): number {
   const ten = 10 ** Math.floor(Math.log10(least_m));
   return [1, 2, 5, 10].map((times) => times * ten).find((step) => step >= least_m - 1e-9) ?? 10 * ten;
@@ -113,7 +113,7 @@ function holes(context: CanvasRenderingContext2D, store: Store, view: View, layo
     if (slot < 0) continue;
     const verdict = sections.verdictOf(slot, held), d = sections.hole[slot] ?? NaN;
     if ((verdict !== FAIL && verdict !== CANNOT_SAY) || !(d > 0)) continue;
-    // Neighbours share a hole, so only the largest within a circle's width is drawn.
+    // Neighbouring sections report the same hole, so only the largest hole within the width of a circle is drawn.
     let largest = true;
     for (let other = index - near; other <= index + near && largest; other += 1) {
       const beside = sections.slot(other), its = beside < 0 ? 0 : (sections.hole[beside] ?? 0);
@@ -150,7 +150,7 @@ function label(context: CanvasRenderingContext2D, text: string, x: number, y: nu
   context.fillText(text, x, y);
 }
 
-/** Runs of the alerts: a pointer and the number, at the top. */
+/** Marks the missed stretch of each alert with a pointer and the alert's number, at the top. */
 function missed(context: CanvasRenderingContext2D, store: Store, view: View, layout: Layout): void {
   context.font = `bold 12px ${FONT}`;
   context.textAlign = "center";
@@ -217,7 +217,7 @@ function line(context: CanvasRenderingContext2D, x: number, y: number, to: numbe
   context.stroke();
 }
 
-/** Over the strip of the whole tunnel: the part visible above, its end, and the vehicle. */
+/** Draws over the strip of the whole tunnel: the part visible above, the tunnel's end, and the vehicle. */
 function drawStrip(
   context: CanvasRenderingContext2D, store: Store, view: View, strip: View, layout: Layout, vehicle: Vehicle | null,
 ): void {

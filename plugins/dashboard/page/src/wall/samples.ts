@@ -1,12 +1,12 @@
-// Samples near the visible part: fetched for a window of chainage, and extended by live ones.
+// Samples near the visible part of the wall: fetched for a window of chainage, then extended by live samples.
 import { SAMPLE_BYTES, type Frame } from "../feed/binary";
 import { downOf, type Round } from "./view";
 
-/** Floats of a sample: x from the origin, fraction of the round from the crown (outside 0 to 1 for the copy beside the seam), time, head + 16 outcome. */
+/** Floats per sample: x from the origin, fraction of the perimeter from the crown (outside 0 to 1 for the copy beside the seam), time, head + 16 outcome. */
 export const FLOATS = 4;
-/** A live frame with more records may have been thinned, because the server sends at most 1,000 at once. */
+/** A live frame with more records than this may have been thinned, because the server sends at most 1,000 at once. */
 const WHOLE_LIVE = 500;
-/** Least interval of requesting all samples again after live frames that may have been thinned. */
+/** Minimum interval between requests for all samples, after live frames that may have been thinned. */
 const AGAIN_MS = 2000;
 const CAPACITY = 260_000;
 const MARGIN = 0.2;
@@ -16,12 +16,12 @@ export class SampleWindow {
   to_m = NaN;
   origin_m = 0;
   count = 0;
-  /** Not all samples are loaded, so missed sections can't be judged from them. */
+  /** Whether only some of the samples are loaded, so that missed sections can't be judged from them. */
   thinned = false;
   private stale = false;
   private asked_ms = -Infinity;
   round: Round = { crown: 0, sign: 1 };
-  /** Distance from the seam, as a share of the round, within which a disc extends across it. */
+  /** Distance from the seam, as a share of the perimeter, within which a disc extends across the seam. */
   seam = 0;
   readonly data = new Float32Array(CAPACITY * FLOATS);
   /** Number of samples already uploaded to the graphics processor. */
@@ -47,7 +47,7 @@ export class SampleWindow {
     return !this.thinned && !this.stale && from_m >= this.from_m && to_m <= this.to_m;
   }
 
-  /** Loads the samples between these chainages; way: the extent with samples. */
+  /** Loads the samples between two chainages. `way` is the range of chainages that has samples. */
   want(from_m: number, to_m: number, way: [number, number], begun_s: number): void {
     const from = Math.max(from_m, way[0]), to = Math.min(to_m, way[1]);
     if (!(to > from) || this.covers(from, to)) return;
@@ -72,7 +72,7 @@ export class SampleWindow {
         this.changed();
       },
       () => {
-        // Without an answer the columns are shown; the request is repeated when the view or the wall changes.
+        // Without an answer, columns are drawn instead. The request is repeated when the view or the wall changes.
         if (this.asked === asked) this.asked = null;
       },
     );
@@ -80,7 +80,7 @@ export class SampleWindow {
 
   private fill(frame: Frame, from_m: number, to_m: number, way: [number, number], begun_s: number): void {
     this.origin_m = Math.round((from_m + to_m) / 2);
-    // Beyond the ends of the coverage extent there are only live samples.
+    // Beyond the ends of the coverage extent, all samples are live ones, so the window is open-ended there.
     this.from_m = from_m <= way[0] ? -Infinity : from_m;
     this.to_m = to_m >= way[1] ? Infinity : to_m;
     this.count = this.uploaded = 0;

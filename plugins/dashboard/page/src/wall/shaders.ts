@@ -1,4 +1,4 @@
-// The wall's shaders, WebGL2.
+// WebGL2 shaders of the wall.
 import { CIVIDIS, rgb, TOP_RATIO } from "./cividis";
 import { ABSENT, FLAGGED_BIT, RATIO_STEPS } from "./columns";
 
@@ -34,7 +34,7 @@ void main() {
   gl_Position = vec4(corner * 2.0 - 1.0, 0.9, 1.0);
 }`;
 
-/** Columns by verdict, D / T and coverage. */
+/** Draws columns, coloured by verdict, D / T and coverage. */
 export const WALL_FRAGMENT = `${COMMON}
 uniform bool u_discs;
 out vec4 colour;
@@ -59,7 +59,7 @@ void main() {
   colour = vec4(seen ? its : (judged ? u_blank : u_open), 1.0);
 }`;
 
-/** Over columns and discs: hatch for can't say, and the outline of flagged sections. */
+/** Draws over columns and discs: a hatch for "can't say", and the outline of flagged sections. */
 export const MARKS_FRAGMENT = `${COMMON}
 out vec4 colour;
 uint stateAt(float x) { return texelFetch(u_columns, ivec2(int(clamp(x, 0.0, u_size.x - 1.0)), 0), 0).x; }
@@ -101,7 +101,7 @@ void main() {
   gl_Position = wall ? vec4(at / u_size * 2.0 - 1.0, 0.5, 1.0) : vec4(3.0, 3.0, 0.0, 1.0);
 }`;
 
-/** Small discs are points, which need one vertex instead of four. */
+/** Draws small discs as points, which need one vertex instead of four. */
 export const POINT_DISC_VERTEX = `${COMMON}${SAMPLE_COMMON}
 layout(location = 0) in vec4 a_sample;
 uniform vec2 u_radius;

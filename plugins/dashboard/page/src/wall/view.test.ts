@@ -2,14 +2,15 @@ import { describe, expect, it } from "vitest";
 import { downOf, followed, heightOf, left_m, right_m, roundOf, startView, zoomed } from "./view";
 
 describe("the wall's view", () => {
-  // A circle of 20 m: arc 0 at the floor, by the left wall (9) to the crown (12) and the right wall (3).
+  // A circle with a perimeter of 20 m. Arc length starts at the floor and passes the left wall (9), the crown (12)
+  // and the right wall (3).
   const clock = Array.from({ length: 12 }, (_, hour) => (10 + (hour * 20) / 12) % 20);
-  it("goes down from 12 by 3, 6 and 9", () => {
+  it("runs down from 12 by way of 3, 6 and 9", () => {
     const round = roundOf(clock, 20);
     expect(clock.map((arc) => Math.round(downOf(round, arc / 20) * 12) % 12)).toEqual([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
     expect(heightOf(startView(), downOf(round, clock[3]! / 20))).toBeCloseTo(0.25);
   });
-  it("goes in the same direction if arc length is counted the other way round", () => {
+  it("runs in the same direction if arc length counts the other way round", () => {
     const other = clock.map((arc) => (20 - arc) % 20), round = roundOf(other, 20);
     expect(round.sign).toBe(-1);
     expect(Math.round(downOf(round, other[9]! / 20) * 12)).toBe(9);

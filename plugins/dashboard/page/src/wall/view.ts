@@ -1,23 +1,24 @@
-// Visible part of the unrolled wall. Across: chainage. Down: fractions of the perimeter, from the crown by 3 o'clock.
+// The visible part of the unrolled wall. Horizontal: chainage. Vertical: fraction of the perimeter, from the crown by
+// way of 3 o'clock.
 
 export interface View {
-  /** Chainage in the middle, m. */
+  /** Chainage at the middle of the view, m. */
   centre_m: number;
-  /** Metres across the whole width. */
+  /** Length of tunnel in the view, m. */
   span_m: number;
-  /** Follows the vehicle. */
+  /** Whether the view follows the vehicle. */
   follow: boolean;
-  /** Shows the whole tunnel, however long it becomes. */
+  /** Whether the view shows the whole tunnel, however long it becomes. */
   whole: boolean;
-  /** Multiple of the height of one round; 1 shows all clock positions. */
+  /** Height of one perimeter as a multiple of the view's height; 1 shows all clock positions. */
   zoomDown: number;
-  /** Fraction of the round, from the crown, at the middle of the height. */
+  /** Fraction of the perimeter, from the crown, at the middle of the view. */
   centreDown: number;
 }
 
 export const LEAST_SPAN_M = 1.5;
 export const FOLLOW_SPAN_M = 60;
-/** Position of the vehicle in a view that follows it: share of the width behind it. */
+/** Share of the view's width that lies behind the vehicle in a view that follows it. */
 const BEHIND = 0.78;
 
 export function startView(): View {
@@ -27,14 +28,14 @@ export function startView(): View {
 export const left_m = (view: View): number => view.centre_m - view.span_m / 2;
 export const right_m = (view: View): number => view.centre_m + view.span_m / 2;
 
-/** Follows a vehicle at a chainage that moves inwards (1) or back (-1); shows little of the part before the portal. */
+/** Centres the view for a vehicle that moves inwards (1) or back (-1). Little of the range before the portal is shown. */
 export function followed(view: View, at_m: number, direction: number, portal_m: number): View {
   const centre_m = at_m - direction * (BEHIND - 0.5) * view.span_m;
   const least_m = Math.min(portal_m, at_m) + 0.46 * view.span_m;
   return { ...view, centre_m: Math.max(centre_m, least_m) };
 }
 
-/** Zooms about a position in the width, 0 to 1; a factor below 1 zooms in. */
+/** Zooms about a position across the width, 0 to 1. A factor below 1 zooms in. */
 export function zoomed(view: View, factor: number, at: number, whole_m: number): View {
   const span_m = Math.min(Math.max(view.span_m * factor, LEAST_SPAN_M), Math.max(whole_m * 1.1, FOLLOW_SPAN_M));
   const fixed_m = left_m(view) + at * view.span_m;
@@ -54,13 +55,13 @@ export function movedDown(view: View, by: number): View {
   return { ...view, centreDown: down - Math.floor(down) };
 }
 
-/** The whole coverage extent, from the portal. */
+/** Shows the whole coverage extent, from the portal. */
 export function wholeView(view: View, from_m: number, to_m: number): View {
   const span_m = Math.max(to_m - from_m, LEAST_SPAN_M) * 1.04;
   return { ...view, span_m, centre_m: (from_m + to_m) / 2, follow: false, whole: true, zoomDown: 1, centreDown: 0.5 };
 }
 
-/** Fraction of the round at the top edge, and direction of clock positions: down from 12 by 3, looking inwards. */
+/** Fraction of the perimeter at the crown, and sign of arc length when clock positions run down from 12 by way of 3, looking inwards. */
 export interface Round { crown: number; sign: number }
 
 export function roundOf(clock_arc_m: number[], perimeter_m: number): Round {
@@ -69,13 +70,13 @@ export function roundOf(clock_arc_m: number[], perimeter_m: number): Round {
   return { crown, sign: step < 0.5 ? 1 : -1 };
 }
 
-/** Fraction of the round from the crown (0 to 1) of an arc length's fraction. */
+/** Converts a fraction of the arc length to a fraction of the perimeter from the crown, 0 to 1. */
 export function downOf(round: Round, arc: number): number {
   const down = round.sign * (arc - round.crown);
   return down - Math.floor(down);
 }
 
-/** Position in the height, 0 (top) to 1, of a fraction of the round; it repeats every `zoomDown`. */
+/** Converts a fraction of the perimeter to a height in the view: 0 is the top, 1 the bottom. The wall repeats every `zoomDown`. */
 export function heightOf(view: View, down: number): number {
   return (down - view.centreDown) * view.zoomDown + 0.5;
 }

@@ -8,11 +8,13 @@ use proptest::prelude::*;
 use super::super::{LogError, LogInfo, LogWriter, LossKind};
 use super::*;
 
-/// Messages per chunk, and number of chunks, of [`log`].
+/// Number of messages in each chunk of [`log`], and number of chunks.
 const PER_CHUNK: usize = 6;
 const CHUNKS: usize = 6;
 
-/// A log and the positions of its chunks. Chunk `n` (from 0) has the log times `100 n + 1` to `100 n + 6`.
+/// Returns a log, its messages, and the positions of its chunks.
+///
+/// Chunk `n` (from 0) has the log times `100 n + 1` to `100 n + 6`.
 fn log() -> (Vec<u8>, Vec<Seen>, Vec<usize>) {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for chunk in 0..CHUNKS as u64 {
@@ -33,14 +35,14 @@ fn log() -> (Vec<u8>, Vec<Seen>, Vec<usize>) {
     (bytes, seen, places[1..].to_vec())
 }
 
-/// The messages without those of one chunk.
+/// Returns the messages of all chunks except one.
 fn without_chunk(seen: &[Seen], chunk: usize) -> Vec<Seen> {
     [&seen[..chunk * PER_CHUNK], &seen[(chunk + 1) * PER_CHUNK..]].concat()
 }
 
 fn is_subsequence(part: &[Seen], whole: &[Seen]) -> bool {
     let mut rest = whole.iter();
-    // A message's channel may also be unknown if all copies of the definitions are damaged.
+    // The kind isn't compared, because a message's channel is unknown if all copies of its definition are damaged.
     part.iter().all(|message| {
         rest.any(|other| {
             (other.1, other.2, other.3, &other.4) == (message.1, message.2, message.3, &message.4)
@@ -72,7 +74,7 @@ struct Worn<'a> {
 impl std::io::Read for Worn<'_> {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         let at = usize::try_from(self.bytes.position()).unwrap();
-        // Reads up to the unreadable bytes.
+        // A read stops before the unreadable bytes.
         let len = if at < self.bad.start { into.len().min(self.bad.start - at) } else { into.len() };
         if self.bad.contains(&at) {
             return Err(std::io::Error::from_raw_os_error(5));
@@ -87,7 +89,7 @@ impl std::io::Seek for Worn<'_> {
     }
 }
 
-/// A log like that of a long dive: long packets, results, and chunks of some kilobytes.
+/// Returns a log like that of a long dive, with long packets, results, and chunks of some kilobytes.
 fn long_log() -> (Vec<u8>, Vec<Seen>) {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for tick in 0..400_u64 {
@@ -113,7 +115,7 @@ fn unreadable_bytes_are_a_loss_and_the_rest_is_read() {
         let medium = Worn { bytes: std::io::Cursor::new(&bytes), bad: bad..bad + 1 };
         let mut reader = match LogReader::new(medium, "worn".to_owned()) {
             Ok(reader) => reader,
-            // Without its first bytes the file can't be identified as a log.
+            // If the first bytes can't be read, the file can't be identified as a log.
             Err(error) => {
                 assert!(bad < 512 && error.to_string().contains("os error 5"), "{bad}: {error}");
                 continue;
@@ -129,7 +131,7 @@ fn unreadable_bytes_are_a_loss_and_the_rest_is_read() {
                 .iter()
                 .any(|loss| matches!(&loss.kind, LossKind::Unreadable(why) if why.contains("os error 5")));
             told += usize::from(is_told);
-            // Everything outside the sector is read.
+            // All messages outside the unreadable sector are read.
             let hit = chunks
                 .iter()
                 .filter(|place| **place < sector.end && sector.start < record_after(&bytes, **place))
@@ -178,7 +180,7 @@ fn chunk_with_zeroed_head_is_a_loss() {
 }
 
 #[test]
-fn thousands_of_random_changes_never_lose_anything_silently() {
+fn losses_by_thousands_of_random_changes_are_reported() {
     let (bytes, seen) = long_log();
     let info = open(&bytes).header().clone();
     let words = noise(11, 12_000);
@@ -186,7 +188,7 @@ fn thousands_of_random_changes_never_lose_anything_silently() {
     let places: Vec<u64> = words.chunks(6).map(word).collect();
     for (number, place) in places.iter().enumerate() {
         let mut changed = bytes.clone();
-        // One bit, a byte, or a block as a medium loses it; every fourth log is also truncated.
+        // Changes one bit, a byte, or a block such as a medium may lose. Every fourth log is also truncated.
         let at = usize::try_from(place % bytes.len() as u64).unwrap();
         match number % 3 {
             0 => changed[at] ^= 1 << ((place >> 40) & 7),
@@ -201,7 +203,7 @@ fn thousands_of_random_changes_never_lose_anything_silently() {
 }
 
 #[test]
-fn log_cut_near_its_start_is_read_with_losses_or_refused() {
+fn log_cut_before_its_first_message_reports_losses_or_is_refused() {
     let (bytes, _, places) = log();
     for cut in 0..places[0] {
         match LogReader::new(Cursor::new(bytes[..cut].to_vec()), "cut".to_owned()) {
@@ -235,7 +237,7 @@ fn wrong_record_length_loses_at_most_its_chunk() {
         let mut bytes = bytes.clone();
         bytes[places[2] + 1..places[2] + 9].copy_from_slice(&lie.to_le_bytes());
         let (got, _) = read(&bytes);
-        // The chunk implies its length a second time, and a record follows: nothing is lost.
+        // The chunk's fields imply its length a second time, and another record follows, so nothing is lost.
         assert!(got == seen, "length {lie}: {} messages", got.len());
         bytes[places[2] + 9 + 36..places[2] + 9 + 44].copy_from_slice(&(lie ^ 3).to_le_bytes());
         let (got, losses) = read(&bytes);
@@ -246,11 +248,11 @@ fn wrong_record_length_loses_at_most_its_chunk() {
 }
 
 #[test]
-fn overwritten_block_loses_only_the_chunks_it_touches() {
+fn overwritten_block_loses_only_overlapping_chunks() {
     let (bytes, seen, places) = log();
     for value in [0, 0xFF, 0x05] {
         let mut bytes = bytes.clone();
-        // From the middle of chunk 1 into chunk 3, like a block lost by a medium.
+        // Overwrites from the middle of chunk 1 into chunk 3, as if a medium had lost a block.
         bytes[places[1] + 100..places[3] + 20].fill(value);
         let (got, losses) = read(&bytes);
         let kept = [&seen[..PER_CHUNK], &seen[4 * PER_CHUNK..]].concat();
@@ -290,7 +292,7 @@ fn intact_messages_are_read_despite_thousands_of_losses() {
 }
 
 #[test]
-fn channels_survive_loss_of_their_chunk_and_of_the_summary() {
+fn channels_are_known_after_loss_of_their_chunk_and_the_summary() {
     let (bytes, seen, places) = log();
     let mut bytes = bytes[..places[CHUNKS - 1]].to_vec();
     let definitions = super::places(&bytes, op::CHUNK)[0];
@@ -302,7 +304,7 @@ fn channels_survive_loss_of_their_chunk_and_of_the_summary() {
 }
 
 #[test]
-fn damaged_first_bytes_do_not_hide_a_log() {
+fn log_with_damaged_first_bytes_is_read() {
     let (mut bytes, seen, _) = log();
     bytes[..8].fill(0);
     let (got, losses) = read(&bytes);
@@ -310,7 +312,7 @@ fn damaged_first_bytes_do_not_hide_a_log() {
 }
 
 #[test]
-fn a_damaged_attachment_is_named() {
+fn damaged_attachment_is_reported_by_name() {
     let (mut bytes, seen, _) = log();
     let at = bytes.windows(6).position(|window| window == b"target").unwrap();
     bytes[at] = b'T';
@@ -321,7 +323,7 @@ fn a_damaged_attachment_is_named() {
 }
 
 #[test]
-fn other_files_are_refused_with_their_first_bytes() {
+fn files_other_than_mcap_are_refused_with_their_first_bytes() {
     let error = |bytes: &[u8]| {
         LogReader::new(Cursor::new(bytes.to_vec()), "dive.mcap".to_owned()).err().unwrap().to_string()
     };
@@ -334,8 +336,7 @@ fn other_files_are_refused_with_their_first_bytes() {
     assert!(error(b"#ROSBAG V2.0\n").contains("23 52 4f 53"));
 }
 
-/// Asserts that each missing message lies within the time of a stated loss, or belongs to a channel whose definition is
-/// lost.
+/// Asserts that each missing message lies within the times of a reported loss.
 fn missing_are_covered(got: &[Seen], seen: &[Seen], losses: &[Loss]) {
     fn key(message: &Seen) -> (u64, u64, u32, &[u8]) {
         (message.1, message.2, message.3, &message.4)
@@ -348,14 +349,14 @@ fn missing_are_covered(got: &[Seen], seen: &[Seen], losses: &[Loss]) {
         };
         assert!(
             losses.iter().any(covers),
-            "{} at {} is missing without a word: {losses:?}",
+            "{} at {} is missing and not reported: {losses:?}",
             missing.0,
             missing.1
         );
     }
 }
 
-/// Asserts that a change either has no effect or is reported, and never produces a spurious message.
+/// Asserts that a change either has no effect or is reported, and that no spurious message is read.
 fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
     match LogReader::new(Cursor::new(bytes), "changed".to_owned()) {
         Ok(mut reader) => {
@@ -372,7 +373,7 @@ fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
 }
 
 #[test]
-fn changed_bit_is_noticed_at_any_position() {
+fn changed_bit_at_any_position_is_reported_or_harmless() {
     let (bytes, seen, places) = log();
     let info = open(&bytes).header().clone();
     for place in 0..bytes.len() {
@@ -389,7 +390,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
-    fn changed_bytes_are_noticed(
+    fn changed_bytes_are_reported_or_harmless(
         changes in prop::collection::vec((any::<prop::sample::Index>(), 1_u8..), 2..6),
     ) {
         let (mut bytes, seen, _) = log();
@@ -402,7 +403,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_read_to_an_end(
+    fn any_bytes_are_read_as_a_log_without_a_panic(
         start in prop::sample::select(vec![&b""[..], &b"\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"[..]]),
         bytes: Vec<u8>,
         records in prop::collection::vec((0_u8..17, 0_u64..80, prop::collection::vec(any::<u8>(), 0..80)), 0..20),

@@ -1,4 +1,4 @@
-//! Logs written by other programs, with the various write options.
+//! Logs written by other programs, with various options of the writer.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -12,18 +12,20 @@ use super::*;
 
 const TOPICS: [&str; 4] = ["/raw/zeta", "/tf", "/raw/alpha", "/sent/alpha"];
 
-/// Messages in the order of writing, which is neither by time nor by channel: topic, log time, sequence.
+/// Messages in the order of writing, each with topic, log time and sequence. They are ordered neither by time nor by
+/// channel.
 fn messages() -> Vec<(usize, u64, u32)> {
     let mut messages = Vec::new();
     for n in 0..400_u32 {
         let topic = usize::try_from(n * 7 % 4).unwrap();
-        // Times go back by up to 30 messages, and repeat.
+        // Times repeat, and go back by up to 30 messages.
         messages.push((topic, 1000 + u64::from((n - n * 13 % 31 % (n + 1)) / 2), n));
     }
     messages
 }
 
-/// The expected reading order: by time, then raw by name, then the others by topic, then sequence.
+/// Messages in the expected reading order: by time, then raw channels by name, then other channels by topic, then
+/// sequence.
 fn wanted() -> Vec<(String, u64, u32)> {
     let kinds = [("raw 1", 1), ("other", 3), ("raw 0", 0), ("sent 0", 2)];
     let mut wanted: Vec<_> =
@@ -59,7 +61,7 @@ fn check(bytes: &[u8], what: &str) -> Vec<Loss> {
     reader.losses().to_vec()
 }
 
-/// Each set of write options, by name.
+/// Returns all combinations of write options, with names.
 fn all_options() -> Vec<(String, WriteOptions)> {
     let mut all = Vec::new();
     for (name, compression) in
@@ -80,17 +82,17 @@ fn all_options() -> Vec<(String, WriteOptions)> {
 }
 
 #[test]
-fn all_write_options_give_the_same_reading_order() {
+fn reading_order_is_independent_of_write_options() {
     for (name, options) in all_options() {
         assert_eq!(check(&write(options), &name), [], "{name}");
     }
 }
 
 #[test]
-fn logs_that_were_never_finished_are_read() {
+fn unfinished_logs_are_read_and_reported_as_truncated() {
     for (name, options) in all_options() {
         let bytes = write(options);
-        // Cut off before the closing records, the first of which is the data end record.
+        // The log ends before its closing records. The data end record is the first of them.
         let end = places(&bytes, op::DATA_END)[0];
         let losses = check(&bytes[..end], &name);
         assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Truncated), "{name}");
@@ -108,7 +110,7 @@ fn unclosed_chunk_delivers_its_messages() {
             let header = MessageHeader { channel_id, sequence: 0, log_time: n, publish_time: n };
             writer.write_to_known_channel(&header, &(n * n * 0x9E37_79B9).to_le_bytes()).unwrap();
         }
-        // Not dropped, since dropping would finish the file.
+        // The writer must not be dropped, because that would finish the file.
         std::mem::forget(writer);
         let mut reader = open(file.get_ref());
         let seen = read_all(&mut reader);
@@ -133,7 +135,7 @@ fn cut_logs_deliver_earlier_messages_and_report_the_cut() {
 }
 
 #[test]
-fn renumbered_copy_of_an_own_log_is_read() {
+fn copied_log_with_renumbered_channels_is_read() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for at in 0..30_u16 {
         let (source, at) = (at % 3, MonoNs(at.into()));
@@ -165,7 +167,7 @@ fn renumbered_copy_of_an_own_log_is_read() {
 }
 
 #[test]
-fn a_changed_byte_outside_chunks_is_noticed() {
+fn changed_byte_outside_chunks_is_reported() {
     let mut bytes = write(WriteOptions::new().use_chunks(false));
     let place = bytes.windows(4).rposition(|window| window == 150_u32.to_le_bytes()).unwrap();
     bytes[place + 3] ^= 1;
@@ -182,7 +184,7 @@ fn wrong_message_length_loses_at_most_two_messages() {
         let mut bytes = bytes.clone();
         bytes[at + 1..at + 9].copy_from_slice(&u64::to_le_bytes(lie));
         let (seen, losses) = read(&bytes);
-        // If nothing looks like a record, the previous message's length may be the wrong one.
+        // If no record seems to begin here, the length of the previous message may be wrong too.
         let lost = if (22..1000).contains(&lie) { 1 } else { 2 };
         assert_eq!(seen.len(), 400 - lost, "length {lie}");
         assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Framing), "length {lie}: {losses:?}");
@@ -191,7 +193,7 @@ fn wrong_message_length_loses_at_most_two_messages() {
 }
 
 #[test]
-fn loss_up_to_the_closing_bytes_is_noticed() {
+fn loss_up_to_the_closing_bytes_is_reported() {
     let chunked = WriteOptions::new().chunk_size(Some(200)).compression(None);
     for (options, opcode) in [(chunked, op::CHUNK), (WriteOptions::new().use_chunks(false), op::MESSAGE)] {
         let whole = write(options);
@@ -204,7 +206,7 @@ fn loss_up_to_the_closing_bytes_is_noticed() {
 }
 
 #[test]
-fn message_that_looks_like_a_footer_is_noticed() {
+fn message_with_a_footer_opcode_is_reported() {
     let mut log = write(WriteOptions::new().use_chunks(false));
     let message = places(&log, op::MESSAGE)[7];
     log[message] = op::FOOTER;
@@ -214,7 +216,7 @@ fn message_that_looks_like_a_footer_is_noticed() {
 }
 
 #[test]
-fn missing_whole_records_are_noticed() {
+fn missing_whole_records_are_reported() {
     let options = || WriteOptions::new().chunk_size(Some(200)).compression(None);
     let whole = write(options());
     let chunks = places(&whole, op::CHUNK);
@@ -227,7 +229,7 @@ fn missing_whole_records_are_noticed() {
         let (_, losses) = read(&without(part));
         assert!(matches!(losses[..], [Loss { kind: LossKind::Truncated, .. }]), "{losses:?}");
     }
-    // Without a summary its position is unknown.
+    // Without a summary, nothing states where the closing records should be.
     assert_eq!(read(&write(options().emit_summary_records(false))).1, []);
 }
 
@@ -259,11 +261,12 @@ fn chunks_with_wrong_times_give_late_messages() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Asserts that reading changed logs without checksums never panics and reads nothing twice.
+    /// Reading changed logs never panics, and reads no message twice.
     ///
-    /// Changes may go unnoticed, and another record may become a message by its opcode.
+    /// These logs have no checksums, so changes may go unnoticed. A changed opcode may turn another record into a
+    /// message.
     #[test]
-    fn changed_logs_are_read_to_an_end(
+    fn changed_foreign_logs_are_read_without_a_panic(
         way in 0..14_usize,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
     ) {
@@ -278,7 +281,7 @@ proptest! {
     }
 }
 
-/// The messages of [`messages`], written by the `mcap` package for Python.
+/// Python program that writes the messages of [`messages`] with the `mcap` package.
 const PYTHON_WRITER: &str = r#"
 import sys
 from mcap.writer import CompressionType, IndexType, Writer
@@ -317,7 +320,7 @@ fn logs_of_the_python_writer_are_read() {
     std::fs::remove_file(&path).unwrap();
 }
 
-/// A log with an attachment of that name; and the position of its record.
+/// Returns a log with an attachment of that name, and the position of the attachment's record.
 fn with_attachment(name: &str) -> (Vec<u8>, usize) {
     let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
     let channel_id = writer.add_channel(0, "/raw/a", "x", &[].into()).unwrap();
@@ -337,7 +340,7 @@ fn with_attachment(name: &str) -> (Vec<u8>, usize) {
 fn unreadable_attachment_is_missing_and_reported() {
     let (whole, at) = with_attachment("notes.txt");
     assert_eq!(read(&whole).1, vec![]);
-    // Opcode and length, two times, name and media type with their lengths; then the length of the data.
+    // The length of the data follows opcode and length, two times, and the name and media type with their lengths.
     let data_len_at = at + 9 + 16 + 4 + "notes.txt".len() + 4 + "text/plain".len();
     assert_eq!(whole[data_len_at..data_len_at + 8], 3000_u64.to_le_bytes());
     for len in [u64::MAX, u64::MAX - 3, u64::MAX - 60, 1 << 63, 3001] {

@@ -1,4 +1,4 @@
-//! Tests of writing and reading together.
+//! Tests that write logs and read them again.
 
 mod damage;
 mod foreign;
@@ -17,14 +17,14 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::{LogHeader, LogReader, Loss, MessageKind, ResultChannel, SourceInfo};
 
-/// A message as the tests compare it: kind, log time, publish time, sequence, data.
+/// A message as compared by the tests: kind, log time, publish time, sequence, data.
 type Seen = (String, u64, u64, u32, Vec<u8>);
 
 fn source(id: &str, plugin: &str, connect: &str) -> SourceInfo {
     SourceInfo { id: id.to_owned(), plugin: plugin.to_owned(), connect: connect.to_owned() }
 }
 
-/// A header with three sources not in the order of their names, and one result.
+/// Returns a header with one result and three sources, which aren't in the order of their names.
 fn header(ticks: bool) -> LogHeader {
     LogHeader {
         vehicle_toml: "target = 0.05 # Wasserschloß\n".to_owned(),
@@ -52,7 +52,7 @@ fn open(bytes: &[u8]) -> LogReader<Cursor<Vec<u8>>> {
     LogReader::new(Cursor::new(bytes.to_vec()), "test".to_owned()).unwrap()
 }
 
-/// All messages of a reader.
+/// Reads all messages.
 fn read_all<R: std::io::Read + std::io::Seek>(reader: &mut LogReader<R>) -> Vec<Seen> {
     let mut seen = Vec::new();
     while let Some(message) = reader.next().unwrap() {
@@ -71,29 +71,29 @@ fn read_all<R: std::io::Read + std::io::Seek>(reader: &mut LogReader<R>) -> Vec<
     seen
 }
 
-/// Messages and losses of a log.
+/// Returns the messages and losses of a log.
 fn read(bytes: &[u8]) -> (Vec<Seen>, Vec<Loss>) {
     let mut reader = open(bytes);
     let seen = read_all(&mut reader);
     (seen, reader.losses().to_vec())
 }
 
-/// Bytes that don't compress.
+/// Returns bytes that don't compress.
 fn noise(seed: u64, len: usize) -> Vec<u8> {
     let words = (1..).map(|i: u64| (seed ^ i).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     words.flat_map(|word| word.to_be_bytes().into_iter().take(3)).take(len).collect()
 }
 
-/// Position of the record after the one at `at`.
+/// Returns the position of the record after the one at `at`.
 fn record_after(bytes: &[u8], at: usize) -> usize {
     let len = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
     at + 9 + usize::try_from(len).unwrap()
 }
 
-/// Positions of the records with that opcode, in a log or a part of one.
+/// Returns the positions of all records with that opcode, in a log or a part of a log.
 fn places(bytes: &[u8], opcode: u8) -> Vec<usize> {
     let (mut at, mut places) = (8, Vec::new());
-    // Less than a record remains at the end: the closing magic bytes, or part of a record.
+    // The rest is shorter than a record's header: the closing magic bytes, or a part of a record.
     while at + 9 <= bytes.len() - 8 {
         places.extend((bytes[at] == opcode).then_some(at));
         at = record_after(bytes, at);

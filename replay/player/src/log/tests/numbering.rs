@@ -1,17 +1,18 @@
-//! Logs with whole records removed, repeated or moved: each record is valid, and the loss is still reported.
+//! Logs from which whole records were removed, or in which they were repeated or moved.
+//! All records are valid, and the change is reported nevertheless.
 
 use mcap::records::op;
 
 use super::super::{DiveLog, LogWriter, LossKind, PartHead, recover};
 use super::*;
 
-/// Chunks of messages, and messages in each.
+/// Number of chunks with messages, and number of messages in each.
 const CHUNKS: u64 = 6;
 const PER_CHUNK: u64 = 10;
-/// An opcode that MCAP leaves to other programs.
+/// An opcode that MCAP reserves for other programs.
 const PRIVATE: u8 = 0x80;
 
-/// A log of chunks. As a part, its messages are numbered like those of a recording's third part.
+/// Returns a log with several chunks. With `is_part`, its messages are numbered as in the third part of a recording.
 fn log(ticks: bool, is_part: bool) -> Vec<u8> {
     let mut header = header(ticks);
     if is_part {
@@ -27,7 +28,7 @@ fn log(ticks: bool, is_part: bool) -> Vec<u8> {
         let at = MonoNs(1_000_000_000 + number * 10_000_000);
         match number % 5 {
             0 if ticks => log.tick(number, at, &[2]).unwrap(),
-            // A channel with messages in a few chunks.
+            // This channel has messages in only a few chunks.
             1 if number % 20 == 1 => log.raw(1, at, at, b"depth").unwrap(),
             2 => log.result(0, at, b"{}").unwrap(),
             _ => log.raw(2, at, at, &noise(number, 20)).unwrap(),
@@ -42,7 +43,7 @@ fn log(ticks: bool, is_part: bool) -> Vec<u8> {
     log.finish().unwrap().0
 }
 
-/// A log's records, of which the first is the header; without magic bytes.
+/// Returns the records of a log, beginning with the header, without the magic bytes.
 fn records(bytes: &[u8]) -> Vec<Vec<u8>> {
     let (mut at, mut records) = (8, Vec::new());
     while at < bytes.len() - 8 {
@@ -57,7 +58,7 @@ fn joined(records: &[Vec<u8>]) -> Vec<u8> {
     [mcap::MAGIC, &records.concat(), mcap::MAGIC].concat()
 }
 
-/// The records without the summary, and with a footer that says that there is none.
+/// Returns the records without the summary. The new footer states that there is none.
 fn without_summary(mut records: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
     let data_end = records.iter().position(|record| record[0] == op::DATA_END).unwrap();
     records.truncate(data_end);
@@ -66,14 +67,14 @@ fn without_summary(mut records: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
     records
 }
 
-/// Puts a private record of the same length in the place of another.
+/// Turns a record into a private record of the same length.
 fn replace(record: &mut [u8]) {
     let body = noise(9, record.len() - 9);
     record[0] = PRIVATE;
     record[9..].copy_from_slice(&body);
 }
 
-/// Indexes of the chunks with messages among the records.
+/// Returns the indexes of the chunks that have messages.
 fn chunks(records: &[Vec<u8>]) -> Vec<usize> {
     let all = (0..records.len()).filter(|place| records[*place][0] == op::CHUNK);
     let chunks: Vec<usize> = all.skip(1).collect();
@@ -81,14 +82,14 @@ fn chunks(records: &[Vec<u8>]) -> Vec<usize> {
     chunks
 }
 
-/// Kinds and texts of the losses; the texts state the missing messages.
+/// Returns the kinds and texts of the losses.
 fn losses(bytes: &[u8]) -> (Vec<LossKind>, Vec<String>) {
     let (_, losses) = read(bytes);
     let texts = losses.iter().map(ToString::to_string).collect();
     (losses.into_iter().map(|loss| loss.kind).collect(), texts)
 }
 
-/// Number of messages reported missing.
+/// Returns the number of messages that the losses report as missing.
 fn missing(kinds: &[LossKind]) -> u64 {
     let missing = kinds.iter().filter_map(|kind| match kind {
         LossKind::Missing { messages } => Some(*messages),
@@ -97,7 +98,7 @@ fn missing(kinds: &[LossKind]) -> u64 {
     missing.sum()
 }
 
-/// Calls `check` with the records of logs with and without ticks, alone and as a part.
+/// Calls `check` with the records of four logs: with and without ticks, each as a log by itself and as a part.
 fn each(mut check: impl FnMut(&str, Vec<Vec<u8>>)) {
     for (ticks, is_part) in [(true, false), (false, false), (true, true), (false, true)] {
         check(&format!("ticks {ticks}, part {is_part}"), records(&log(ticks, is_part)));
@@ -105,12 +106,12 @@ fn each(mut check: impl FnMut(&str, Vec<Vec<u8>>)) {
 }
 
 #[test]
-fn whole_log_has_no_losses() {
+fn intact_log_has_no_losses() {
     each(|what, records| assert_eq!(read(&joined(&records)).1, [], "{what}"));
 }
 
 #[test]
-fn chunk_replaced_by_a_private_record_is_missing() {
+fn replaced_chunk_is_reported_as_missing_messages() {
     each(|what, records| {
         for chunk in chunks(&records) {
             let mut records = records.clone();
@@ -130,8 +131,8 @@ fn removed_chunk_without_summary_is_reported_at_its_place() {
             let mut records = without_summary(records.clone());
             records.remove(*chunk);
             let (kinds, texts) = losses(&joined(&records));
-            // A log that isn't a part doesn't state its number of messages, so missing last messages of a channel go
-            // unnoticed.
+            // Only a part states its number of messages. In other logs the loss of a channel's last messages isn't
+            // noticed.
             let wanted = match number {
                 _ if what.contains("part true") => PER_CHUNK,
                 4 => PER_CHUNK - 1,
@@ -149,7 +150,7 @@ fn removed_chunk_without_summary_is_reported_at_its_place() {
 }
 
 #[test]
-fn doubled_chunk_is_reported_as_repeated() {
+fn duplicate_chunk_is_reported_as_repeated_messages() {
     each(|what, records| {
         for chunk in chunks(&records) {
             let mut records = without_summary(records.clone());
@@ -178,9 +179,9 @@ fn swapped_chunks_are_reported_as_out_of_order() {
     });
 }
 
-/// The log is closed again after the cut, with and without the summary of the remaining records.
+/// After the cut the log is closed again, without a summary.
 #[test]
-fn tail_cut_off_at_the_end_of_a_record_is_reported() {
+fn log_cut_between_records_and_closed_again_is_reported() {
     each(|what, records| {
         for chunk in chunks(&records) {
             let whole = without_summary(records.clone());
@@ -191,9 +192,9 @@ fn tail_cut_off_at_the_end_of_a_record_is_reported() {
     });
 }
 
-/// The statistics record counts the messages of the whole log.
+/// The summary's statistics state the number of messages in the whole log.
 #[test]
-fn summary_gives_the_number_of_messages_missing_from_a_cut_tail() {
+fn messages_missing_at_the_end_are_counted_from_the_summary() {
     each(|what, records| {
         let last = *chunks(&records).last().unwrap();
         let mut records = records;
@@ -212,9 +213,9 @@ fn part_without_its_end_record_is_reported() {
     assert_eq!(kinds, [LossKind::Metadata("headrace.part.end".to_owned())], "{texts:?}");
 }
 
-/// One cause gives one loss.
+/// One cause must give only one loss.
 #[test]
-fn messages_of_a_damaged_chunk_are_not_reported_twice() {
+fn damaged_chunk_is_reported_as_one_loss() {
     each(|what, records| {
         for chunk in chunks(&records) {
             let mut records = records.clone();
@@ -227,7 +228,7 @@ fn messages_of_a_damaged_chunk_are_not_reported_twice() {
 }
 
 #[test]
-fn losses_after_going_back_equal_those_of_a_straight_read() {
+fn numbering_losses_after_going_back_equal_those_of_a_straight_read() {
     each(|what, records| {
         let mut records = without_summary(records);
         let places = chunks(&records);
@@ -251,7 +252,7 @@ fn losses_after_going_back_equal_those_of_a_straight_read() {
     });
 }
 
-/// A chunk record whose content is the records, unpacked and without a checksum.
+/// Returns a chunk record that contains `content`, neither compressed nor protected by a checksum.
 fn chunk_of(content: &[u8], times: [u64; 2]) -> Vec<u8> {
     let mut body = times.map(u64::to_le_bytes).concat();
     body.extend((content.len() as u64).to_le_bytes());
@@ -263,7 +264,7 @@ fn chunk_of(content: &[u8], times: [u64; 2]) -> Vec<u8> {
 }
 
 #[test]
-fn chunk_within_a_chunk_is_reported_and_recovery_states_it() {
+fn chunk_within_a_chunk_is_reported_and_stated_by_recovery() {
     each(|what, records| {
         let mut records = records;
         let place = chunks(&records)[2];

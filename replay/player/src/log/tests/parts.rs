@@ -1,4 +1,4 @@
-//! A recording in parts reads as one log; missing and foreign parts are named.
+//! Recordings in parts, which are read as one log. Missing and foreign parts are reported.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use headrace_geometry::time::DurNs;
 use super::super::{DiveLog, Every, LogError, LogWriter, Recorder, Rotation, files_of, part_path, recover};
 use super::*;
 
-/// A folder that is removed with the test.
+/// A temporary folder, which is removed on drop.
 pub(super) struct Folder(pub(super) PathBuf);
 
 impl Folder {
@@ -33,7 +33,7 @@ impl Drop for Folder {
     }
 }
 
-/// Ticks of a tenth of a second, each of two packets.
+/// Number of ticks in a recording. Each lasts a tenth of a second and has two packets.
 const TICKS: u64 = 400;
 
 fn record(path: &Path, rotation: Option<&Rotation>) -> super::super::Summary {
@@ -71,7 +71,7 @@ fn losses(files: &[PathBuf]) -> Vec<String> {
 }
 
 #[test]
-fn parts_hold_the_same_messages_as_a_single_file() {
+fn parts_have_the_same_messages_as_a_single_file() {
     let whole = Folder::new("whole");
     let single = whole.0.join("dive.mcap");
     let written = record(&single, None);
@@ -86,7 +86,7 @@ fn parts_hold_the_same_messages_as_a_single_file() {
         let paths: Vec<PathBuf> = summary.parts.iter().map(|part| part.path.clone()).collect();
         assert_eq!(paths, (1..=parts).map(|number| folder.part(number)).collect::<Vec<_>>(), "{name}");
         assert_eq!(folder.files(), paths);
-        // By the name of the recording, and in any order.
+        // The parts are found by the name of the recording, and may be listed in any order.
         assert_eq!(files_of(&[folder.0.join("dive.mcap")]).unwrap(), paths);
         let backwards: Vec<PathBuf> = paths.iter().rev().cloned().collect();
         for files in [&paths, &backwards] {
@@ -97,7 +97,7 @@ fn parts_hold_the_same_messages_as_a_single_file() {
             assert_eq!(counts, summary.parts.iter().map(|part| part.raw_messages).collect::<Vec<_>>());
         }
         if let Every::Bytes(bytes) = every {
-            // Half a second of the recording takes 4 kB.
+            // A part may exceed the limit by half a second of the recording, which takes 4 kB.
             let len = |path: &PathBuf| std::fs::metadata(path).unwrap().len();
             let ended = &paths[..paths.len() - 1];
             assert!(ended.iter().all(|path| (bytes..bytes + 10_000).contains(&len(path))));
@@ -114,7 +114,7 @@ fn parts_hold_the_same_messages_as_a_single_file() {
 }
 
 #[test]
-fn missing_or_exchanged_part_is_named() {
+fn missing_or_replaced_part_is_reported_by_number() {
     let folder = Folder::new("missing");
     record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
     let files = folder.files();
@@ -137,7 +137,7 @@ fn missing_or_exchanged_part_is_named() {
     );
     assert_eq!(said(&[4]), ["parts 1 to 3 of the recording are missing (before 31.000 s)"]);
 
-    // Another log with the same part number replaces it.
+    // Part 2 is replaced by another log with the same part number.
     let other = Folder::new("unlike");
     let mut header = LogReader::open(&files[1]).unwrap().header().clone();
     let part = header.part.take().unwrap();
@@ -149,10 +149,7 @@ fn missing_or_exchanged_part_is_named() {
     let mixed = [files[0].clone(), other.part(2), files[2].clone(), files[3].clone()];
     let told = losses(&mixed);
     assert_eq!(told.len(), 1, "{told:?}");
-    assert!(
-        told[0].starts_with("part 2 is not the one that was recorded: with it there are 401"),
-        "{told:?}"
-    );
+    assert!(told[0].starts_with("part 2 is not the one that was recorded: it states 401"), "{told:?}");
 }
 
 #[test]
@@ -172,7 +169,7 @@ fn mixed_recordings_and_duplicate_parts_are_refused() {
     let simulated = other.0.join("simulated.mcap");
     LogWriter::create(&simulated, &header(false)).unwrap().finish().unwrap();
     assert!(matches!(open(&[one.part(1), simulated]), LogError::NotAPart { .. }));
-    // A recording doesn't overwrite another's parts.
+    // A new recording must not overwrite the parts of another one.
     let again = Recorder::create(&one.0.join("dive.mcap"), &header(true), &rotation(every), 0, None);
     assert!(matches!(again.err().unwrap(), LogError::Create { path, .. } if path == one.part(1)));
 }
@@ -182,7 +179,7 @@ fn damaged_parts_lose_only_damaged_messages_and_recover_to_one_log() {
     let folder = Folder::new("damaged");
     record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
     let whole = all(&mut DiveLog::open(&folder.files()).unwrap());
-    // After a power cut one part has no end, and the next is still empty.
+    // As after a power cut, part 3 has no end, and part 4 is still empty.
     let third = std::fs::read(folder.part(3)).unwrap();
     std::fs::write(folder.part(3), &third[..third.len() * 2 / 3]).unwrap();
     std::fs::write(folder.part(4), []).unwrap();
@@ -206,7 +203,7 @@ fn damaged_parts_lose_only_damaged_messages_and_recover_to_one_log() {
 #[test]
 fn existing_part_name_is_skipped() {
     let folder = Folder::new("refused");
-    // A folder created after the start of the recording blocks the path of the second part.
+    // A folder that is created after the start of the recording has the path of the second part.
     let (mut port, handle) = Recorder::create(
         &folder.0.join("dive.mcap"),
         &header(true),

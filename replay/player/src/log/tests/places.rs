@@ -9,7 +9,7 @@ use super::*;
 
 const MESSAGES: u64 = 120;
 
-/// A log of this program, in the order of its ticks.
+/// Returns a log of this program, which is read in file order.
 fn by_ticks() -> Vec<u8> {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for number in 0..MESSAGES {
@@ -25,7 +25,7 @@ fn by_ticks() -> Vec<u8> {
     log.finish().unwrap().0
 }
 
-/// A log of another writer, whose chunks overlap in time.
+/// Returns a log of another writer. Its chunks overlap in time.
 fn by_times() -> Vec<u8> {
     let mut writer =
         WriteOptions::new().chunk_size(Some(300)).compression(None).create(Cursor::new(Vec::new())).unwrap();
@@ -40,7 +40,7 @@ fn by_times() -> Vec<u8> {
     writer.into_inner().into_inner()
 }
 
-/// Positions of chunk records, and their first fields: times, lengths, checksum.
+/// Returns the positions of all bytes in the headers of chunks: times, lengths, checksum.
 fn heads(bytes: &[u8]) -> Vec<usize> {
     places(bytes, op::CHUNK).into_iter().flat_map(|at| at..at + 45).collect()
 }
@@ -56,7 +56,7 @@ fn damaged(mut bytes: Vec<u8>, changes: &[(bool, prop::sample::Index, u8)]) -> V
 
 type Reader = LogReader<Cursor<Vec<u8>>>;
 
-/// `count` messages, or all that are left.
+/// Reads `count` messages, or all that are left.
 fn take(reader: &mut Reader, count: usize) -> Vec<(u64, Vec<u8>)> {
     let mut seen = Vec::new();
     while seen.len() < count
@@ -67,8 +67,9 @@ fn take(reader: &mut Reader, count: usize) -> Vec<(u64, Vec<u8>)> {
     seen
 }
 
-/// Resumes from the position after `first` messages, with a reader that has read `further` ones since and with a new
-/// one.
+/// Checks that reading resumes correctly from the position after `first` messages.
+///
+/// It resumes with the reader that has meanwhile read `further` messages, and with a new reader.
 fn check(bytes: &[u8], first: usize, further: usize) -> Result<(), TestCaseError> {
     let mut straight = open(bytes);
     let all = take(&mut straight, usize::MAX);
@@ -87,7 +88,7 @@ fn check(bytes: &[u8], first: usize, further: usize) -> Result<(), TestCaseError
 
 proptest! {
     #[test]
-    fn going_back_in_a_damaged_log_hides_no_loss(
+    fn going_back_in_a_damaged_log_gives_the_same_messages_and_losses(
         changes in proptest::collection::vec((any::<bool>(), any::<prop::sample::Index>(), any::<u8>()), 0..8),
         first in 0..200_usize,
         further in 0..200_usize,
@@ -101,14 +102,15 @@ proptest! {
     }
 }
 
-/// Two adjacent chunks, the first damaged and with wrong times: the time span of each loss depends on the other chunk.
+/// Two adjacent chunks fail their checksums, and the first one states a wrong time.
+/// The times of each loss depend on the other chunk.
 #[test]
 fn loss_times_of_damaged_chunks_are_unchanged_after_going_back() {
     for (whole, changed) in [(by_ticks(), 2), (by_times(), 4)] {
         let chunks = places(&whole, op::CHUNK);
         let mut bytes = whole;
         for chunk in &chunks[changed..changed + 2] {
-            // Its checksum.
+            // Damages the checksum of the chunk.
             bytes[chunk + 9 + 24] ^= 1;
         }
         bytes[chunks[changed] + 9] ^= 2;

@@ -12,7 +12,7 @@ use super::super::{
 };
 use super::*;
 
-/// A slow medium that reports when something has been flushed to it.
+/// A slow medium. It sends all bytes so far at each flush.
 struct SlowMedium {
     bytes: Vec<u8>,
     nap: Duration,
@@ -28,7 +28,7 @@ impl Write for SlowMedium {
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        // Ignored: the receiver may be gone.
+        // The receiver may have been dropped.
         self.done.try_send(self.bytes.clone()).ok();
         Ok(())
     }
@@ -68,7 +68,7 @@ fn slow_medium_loses_nothing_if_the_loop_waits_for_the_queue() {
     }
 }
 
-/// A medium whose flushes wait until they are released one by one, or all once the sender is gone.
+/// A medium whose flushes each wait for a release. After the sender is dropped no flush waits.
 struct Held(mpsc::Receiver<()>);
 
 impl Write for Held {
@@ -82,8 +82,8 @@ impl Write for Held {
     }
 }
 
-/// Unsynced time runs from the first to the last tick until a sync returns, and is zero after a sync that began after
-/// the last tick.
+/// The unsynced time is that from the first to the last tick, until a sync returns.
+/// It is zero after a sync that began after the last tick.
 #[test]
 fn unsynced_time_runs_from_last_sync_to_last_tick() {
     let (go, held) = mpsc::channel();
@@ -109,9 +109,10 @@ fn unsynced_time_runs_from_last_sync_to_last_tick() {
     assert_eq!(handle.finish().unwrap().messages, 7);
 }
 
-/// Seconds of work for a slow medium: a dive on ports waits 0.6 s in total, any other while there is progress.
+/// The medium has seconds of work. A dive on ports waits 0.6 s in total. Other recordings wait while there is
+/// progress.
 #[test]
-fn live_recording_ends_in_time_on_a_slow_medium() {
+fn recording_ends_in_time_only_on_request_on_a_slow_medium() {
     for in_time in [true, false] {
         let (medium, _flushed) = slow(5);
         let (mut port, mut handle) = Recorder::start(medium, &header(true), 16 << 20).unwrap();
@@ -130,7 +131,7 @@ fn live_recording_ends_in_time_on_a_slow_medium() {
 }
 
 #[test]
-fn messages_older_than_a_second_are_readable_without_an_end() {
+fn messages_older_than_a_second_are_readable_in_an_open_log() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let header_only = flushed.recv_timeout(Duration::from_secs(1)).unwrap();
@@ -148,7 +149,7 @@ fn messages_older_than_a_second_are_readable_without_an_end() {
 }
 
 #[test]
-fn full_queue_accepts_no_part_of_an_entry() {
+fn entry_larger_than_the_queue_is_refused_whole() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let capacity = port.capacity_bytes();
@@ -161,7 +162,7 @@ fn full_queue_accepts_no_part_of_an_entry() {
 }
 
 #[test]
-fn a_dropped_handle_completes_the_file() {
+fn dropped_recorder_handle_completes_the_file() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     port.raw(0, MonoNs(5), MonoNs(5), b"ping").unwrap();
@@ -170,7 +171,7 @@ fn a_dropped_handle_completes_the_file() {
     assert_eq!((seen.len(), losses), (1, vec![]));
 }
 
-/// A medium with limited room.
+/// A medium with limited space.
 struct SmallMedium(Arc<AtomicUsize>);
 
 impl Write for SmallMedium {
@@ -190,7 +191,7 @@ impl Write for SmallMedium {
 }
 
 #[test]
-fn a_full_medium_is_reported_and_does_not_stop_the_loop() {
+fn full_medium_is_reported_and_does_not_stop_the_loop() {
     let room = Arc::new(AtomicUsize::new(1 << 20));
     let (mut port, handle) = Recorder::start(SmallMedium(Arc::clone(&room)), &header(true), 0).unwrap();
     room.store(0, Ordering::Relaxed);
@@ -214,7 +215,7 @@ fn a_full_medium_is_reported_and_does_not_stop_the_loop() {
 }
 
 #[test]
-fn an_unknown_source_is_an_error_of_the_thread() {
+fn message_of_an_unknown_source_is_a_recording_fault() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(false), 0).unwrap();
     port.raw(77, MonoNs(0), MonoNs(0), &[]).unwrap();
@@ -223,7 +224,7 @@ fn an_unknown_source_is_an_error_of_the_thread() {
 }
 
 #[test]
-fn a_recording_is_never_overwritten() {
+fn existing_recording_is_not_overwritten() {
     let path = std::env::temp_dir().join(format!("headrace-recorder-{}.mcap", std::process::id()));
     std::fs::remove_file(&path).ok();
     let (mut port, handle) =
@@ -239,7 +240,7 @@ fn a_recording_is_never_overwritten() {
     std::fs::remove_file(&path).unwrap();
 }
 
-/// A medium with so many bytes free.
+/// A storage that reports a given number of free bytes.
 struct Within(Option<u64>, Option<SlowMedium>);
 
 impl Storage for Within {
@@ -287,12 +288,12 @@ fn filling_disk_keeps_small_messages_and_states_omissions() {
         follows_echoes: true,
         ..ResultChannel::default()
     });
-    // Lines of a velocity log are as long as echoes, but aren't echoes.
+    // Only source 0 is a sonar. The packets of source 2 are as long as echoes, as the lines of a velocity log are.
     header.sonars = vec![0];
     let (mut port, handle) = within(Some(5_000_000), medium, &header, None);
     for tick in 1..=100_u64 {
         let at = MonoNs(tick * 1_000_000_000);
-        // All of this fits in the queue.
+        // All of these messages fit in the queue.
         port.raw(0, at, at, &noise(tick, 265)).unwrap();
         port.raw(2, at, at, &noise(tick, 140)).unwrap();
         port.tick(tick, at, &[0, 2]).unwrap();
@@ -320,11 +321,11 @@ fn filling_disk_keeps_small_messages_and_states_omissions() {
 }
 
 #[test]
-fn messages_without_room_are_counted() {
+fn messages_beyond_the_queue_capacity_are_counted() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let sent = handle.line_port();
-    // Faster than any thread can empty the queue, which holds 2,048.
+    // No thread can empty the queue of 2,048 messages as fast as this loop fills it.
     for number in 0..1_000_000_u64 {
         sent.sent(1, MonoNs(number), b"poll");
         if sent.sent_dropped() > 0 {
@@ -338,7 +339,7 @@ fn messages_without_room_are_counted() {
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }
 
-/// Runs steps at the given times, with packets dropped before each; returns the log's statements of drops.
+/// Runs the recorder at the given times, with packets dropped before each. Returns the statements in the log.
 fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
     let (medium, flushed) = slow(0);
     let storage = Box::new(Within(None, Some(medium)));
@@ -358,7 +359,7 @@ fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
 }
 
 #[test]
-fn packets_dropped_by_lines_are_stated_by_source_every_few_seconds() {
+fn packets_dropped_by_lines_are_stated_per_source_every_few_seconds() {
     let s = Duration::from_secs;
     let words = |packets: u64, id: &str, from: u64, to: u64| {
         format!(
@@ -379,9 +380,9 @@ fn packets_dropped_by_lines_are_stated_by_source_every_few_seconds() {
     );
 }
 
-/// No count is lost while the recorder takes none, although the source of some packets is then unknown.
+/// Every dropped packet is counted while the recorder is too slow, although the source of some is then unknown.
 #[test]
-fn drops_without_room_are_counted() {
+fn drops_beyond_the_queue_capacity_are_counted() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     port.tick(1, MonoNs(1), &[]).unwrap();
@@ -396,12 +397,12 @@ fn drops_without_room_are_counted() {
     assert_eq!(counts.sum::<u64>(), 200_000, "{losses:?}");
 }
 
-/// Derives a message from each result except the last channel's, for existing channels and for one that doesn't exist.
+/// Derives two messages from each result: one for an existing channel, and one for a channel that doesn't exist.
 struct Echoing;
 
 impl DerivedChannels for Echoing {
     fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>) {
-        assert_eq!(channel, 0, "what it made doesn't come back");
+        assert_eq!(channel, 0, "derived messages aren't passed back to the derivation");
         for channel in [1, 9] {
             made.push(Made { channel, at, bytes: [b"made of ", message].concat() });
         }
@@ -413,7 +414,7 @@ impl DerivedChannels for Echoing {
 }
 
 #[test]
-fn derived_messages_follow_their_result_and_are_dropped_first_on_a_filling_disk() {
+fn derived_messages_follow_their_result_and_are_dropped_first() {
     for (free, kept) in [(None, 3), (Some(5_000_000), 0)] {
         let (medium, flushed) = slow(0);
         let mut header = header(true);
@@ -436,8 +437,8 @@ fn derived_messages_follow_their_result_and_are_dropped_first_on_a_filling_disk(
 }
 
 #[test]
-fn blocked_medium_does_not_prevent_the_end() {
-    /// A medium that accepts the header and then blocks until the test is over.
+fn recorder_ends_despite_a_blocked_medium() {
+    /// A medium that accepts the header, and then blocks until the test is over.
     struct Hanging(usize, mpsc::Receiver<()>);
 
     impl Write for Hanging {
@@ -463,7 +464,7 @@ fn blocked_medium_does_not_prevent_the_end() {
 }
 
 #[test]
-fn skipped_ticks_are_stated() {
+fn skipped_ticks_are_stated_in_the_log() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let second = |seconds: u64| MonoNs(seconds * 1_000_000_000);

@@ -1,4 +1,4 @@
-//! A recovered log: all readable messages in order, and the stated losses.
+//! Recovered logs, which contain all readable messages in order and state the losses.
 
 use mcap::records::op;
 
@@ -12,7 +12,7 @@ fn recovered(bytes: &[u8]) -> (Vec<u8>, Recovered) {
     (output, done)
 }
 
-/// Five chunks of two seconds, with ten messages per second.
+/// Returns a log with five chunks of two seconds, and ten messages per second.
 fn log(ticks: bool) -> Vec<u8> {
     let mut log = LogWriter::new(Vec::new(), &header(ticks)).unwrap();
     for number in 0..100_u64 {
@@ -30,7 +30,7 @@ fn log(ticks: bool) -> Vec<u8> {
     log.finish().unwrap().0
 }
 
-/// The messages without their numbers, which restart.
+/// Returns the messages without their sequence numbers, because a recovered log numbers its messages anew.
 fn unnumbered(seen: Vec<Seen>) -> Vec<Seen> {
     seen.into_iter().map(|message| (message.0, message.1, message.2, 0, message.4)).collect()
 }
@@ -52,7 +52,7 @@ fn intact_log_is_recovered_completely() {
 }
 
 #[test]
-fn a_damaged_log_is_recovered_with_its_losses() {
+fn recovered_log_states_the_losses_of_the_damaged_log() {
     let mut bytes = log(true);
     let chunks = places(&bytes, op::CHUNK);
     bytes.truncate(bytes.len() * 9 / 10);
@@ -72,14 +72,14 @@ fn a_damaged_log_is_recovered_with_its_losses() {
         "{text:?}"
     );
     assert!(text.iter().all(|text| !text.starts_with("byte ")), "{text:?}");
-    // Recovering a second time gives the same log.
+    // Recovering the recovered log gives an equal log.
     let (again, done) = recovered(&output);
     assert_eq!(done.losses.iter().map(ToString::to_string).collect::<Vec<_>>(), text);
     assert_eq!(read(&again).0, read(&output).0);
 }
 
 #[test]
-fn lost_vehicle_file_is_not_replaced() {
+fn recovery_does_not_replace_a_lost_vehicle_file() {
     let mut bytes = log(true);
     let at = bytes.windows(6).position(|window| window == b"target").unwrap();
     bytes[at] = b'T';

@@ -1,4 +1,4 @@
-//! Written messages are read back.
+//! Logs that are written and read back.
 
 use std::io::Write;
 
@@ -6,7 +6,7 @@ use super::super::format::{Tick, seal};
 use super::super::{LogError, LogReader, LogWriter, LossKind, file_digest};
 use super::*;
 
-/// Writes ticks that consume packets out of time order, with results and sent bytes between.
+/// Writes ticks that consume packets out of time order. Results and sent bytes are between them.
 fn write<W: Write>(log: &mut LogWriter<W>, rounds: u32) -> Vec<Seen> {
     let mut written = Vec::new();
     for number in 0..rounds {
@@ -30,7 +30,7 @@ fn write<W: Write>(log: &mut LogWriter<W>, rounds: u32) -> Vec<Seen> {
 }
 
 #[test]
-fn a_log_with_ticks_is_read_as_it_was_written() {
+fn log_with_ticks_is_read_in_the_order_of_writing() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     let mut written = write(&mut log, 50);
     log.flush().unwrap();
@@ -63,7 +63,7 @@ fn written_header_is_read_back() {
 }
 
 #[test]
-fn a_log_without_ticks_is_read_by_time_then_source_then_sequence() {
+fn log_without_ticks_is_read_by_time_then_source_then_sequence() {
     let mut log = LogWriter::new(Vec::new(), &header(false)).unwrap();
     for (source, at) in [(1, 30), (0, 30), (2, 10), (2, 10), (0, 20)] {
         log.raw(source, MonoNs(at), MonoNs(at), &[]).unwrap();
@@ -80,7 +80,7 @@ fn a_log_without_ticks_is_read_by_time_then_source_then_sequence() {
 }
 
 #[test]
-fn the_same_messages_give_the_same_bytes() {
+fn equal_messages_give_equal_log_bytes() {
     let log = || {
         let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
         write(&mut log, 3000);
@@ -90,7 +90,7 @@ fn the_same_messages_give_the_same_bytes() {
 }
 
 #[test]
-fn chunks_close_by_size() {
+fn chunks_are_closed_by_size() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for at in 0..40 {
         log.raw(0, MonoNs(at), MonoNs(at), &vec![7; 100_000]).unwrap();
@@ -111,7 +111,7 @@ fn messages_for_undeclared_channels_are_refused() {
 }
 
 #[test]
-fn file_is_opened_by_path_and_digested() {
+fn log_is_opened_by_path_and_its_digest_computed() {
     let path = std::env::temp_dir().join(format!("headrace-round-trip-{}.mcap", std::process::id()));
     let mut log = LogWriter::create(&path, &header(true)).unwrap();
     write(&mut log, 10);
@@ -123,7 +123,7 @@ fn file_is_opened_by_path_and_digested() {
     }
     assert_eq!(count, 50);
     std::fs::write(&path, b"abc").unwrap();
-    // Source: FIPS 180-4, the one-block example.
+    // Expected digest: FIPS 180-4, the one-block example.
     let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
     assert_eq!(file_digest(&path).unwrap(), abc);
     let error = LogReader::open(&path).err().unwrap().to_string();
@@ -133,7 +133,7 @@ fn file_is_opened_by_path_and_digested() {
 }
 
 #[test]
-fn a_later_format_is_refused() {
+fn later_log_format_is_refused() {
     let (bytes, _) = LogWriter::new(Vec::new(), &header(true)).unwrap().finish().unwrap();
     assert!(LogReader::new(Cursor::new(bytes), "old".to_owned()).is_ok());
     let mut writer = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();

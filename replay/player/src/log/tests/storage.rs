@@ -1,6 +1,5 @@
-//! Every storage operation fails in turn, once or for a while.
-//!
-//! No loss is unreported, no message is written twice, and no cut-off log looks complete.
+//! Recordings on a storage whose operations fail, each in turn, once or for a while.
+//! Every loss is reported, no message is written twice, and no cut-off log looks complete.
 
 #![expect(
     clippy::disallowed_types,
@@ -31,10 +30,10 @@ enum Op {
     Remove,
 }
 
-/// Decides by kind and number which operations fail.
+/// Decides by kind and number whether an operation fails.
 type Plan = Box<dyn FnMut(Op, u64) -> Option<io::Error> + Send>;
 
-/// A file, and how many of its bytes survive a power cut.
+/// Content of a file, and number of its bytes that survive a power cut.
 #[derive(Debug, Clone, Default)]
 struct Content {
     bytes: Vec<u8>,
@@ -45,7 +44,7 @@ struct World {
     files: BTreeMap<PathBuf, Content>,
     ops: u64,
     plan: Plan,
-    /// Whether a failed sync also loses the data it should have saved.
+    /// Whether a failed sync loses the data that it should have saved.
     forgets: bool,
 }
 
@@ -72,7 +71,7 @@ impl Faulty {
         act(&mut self.0.lock().unwrap())
     }
 
-    /// Writes the files into a folder: only synced bytes after a power cut, otherwise all.
+    /// Writes the files into a folder. If `cut` is true, only synced bytes are written, as after a power cut.
     fn store(&self, cut: bool) {
         self.with(|world| {
             for (path, content) in &world.files {
@@ -112,7 +111,7 @@ impl StoredFile for FaultyFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.with(|world| {
             let done = world.attempt(Op::Write);
-            // A failing write may have done part of its work.
+            // A write that fails may have written a part of its bytes.
             let len = if done.is_err() { bytes.len() / 2 } else { bytes.len().min(3000) };
             world.files.get_mut(&self.1).unwrap().bytes.extend_from_slice(&bytes[..len]);
             done.map(|()| len)
@@ -140,7 +139,7 @@ fn rotation(every: Option<Every>) -> Rotation {
     Rotation { every, dive: "one".to_owned() }
 }
 
-/// Records a dive of six seconds with ten steps per second.
+/// Records a dive of six seconds, with ten steps per second.
 fn dive(folder: &Folder, storage: &Faulty, every: Option<Every>) -> (Summary, Vec<RecordingEvent>) {
     let path = folder.0.join("dive.mcap");
     let begun =
@@ -159,7 +158,7 @@ fn dive(folder: &Folder, storage: &Faulty, every: Option<Every>) -> (Summary, Ve
     (worker.finish(Duration::from_millis(100 * TICKS)), events)
 }
 
-/// Messages and losses of the recording in a folder.
+/// Reads the messages and losses of the recording in a folder.
 fn read_back(folder: &Folder) -> (Vec<Seen>, Vec<Loss>) {
     let mut log = DiveLog::open(&files_of(&[folder.0.join("dive.mcap")]).unwrap()).unwrap();
     let seen = all(&mut log);
@@ -170,7 +169,8 @@ fn eio() -> io::Error {
     io::Error::from_raw_os_error(5)
 }
 
-/// Result of a dive without faults, and its number of operations. The first operations write the header.
+/// Returns the messages of a dive without faults, and the number of storage operations.
+/// The first operations write the header.
 fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
     let folder = Folder::new(name);
     let storage = Faulty::new(|_, _| None);
@@ -182,7 +182,8 @@ fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
     (seen, storage.with(|world| world.ops))
 }
 
-/// Number of operations before the first message: creating the first part, and writing and syncing its header.
+/// Returns the number of operations before the first message. They create the first part, and write and sync its
+/// header.
 fn header_ops() -> u64 {
     let folder = Folder::new("header");
     let storage = Faulty::new(|_, _| None);
@@ -192,7 +193,7 @@ fn header_ops() -> u64 {
 }
 
 #[test]
-fn operation_failing_once_loses_nothing_and_is_stated() {
+fn storage_fault_that_occurs_once_loses_nothing_and_is_stated() {
     for (name, every) in [("once", None), ("once in parts", Some(Every::Span(DurNs::from_millis(2000))))] {
         let (expected, ops) = without_faults(name, every);
         for (at, forgets) in (header_ops()..ops).flat_map(|at| [(at, false), (at, true)]) {
@@ -205,14 +206,14 @@ fn operation_failing_once_loses_nothing_and_is_stated() {
             let which = format!("{name}, operation {at} of {ops}, {forgets}: {:?}", summary.faults);
             assert_eq!(seen, expected, "{which}");
             assert_eq!(summary.messages, 4 * TICKS, "{which}");
-            // If the next part can't be begun, only the rotation fails.
+            // If the failed operation was to begin the next part, only the rotation fails.
             let Some(fault) = summary.faults.first() else {
                 assert!(every.is_some() && losses.is_empty(), "{which}: {losses:?}");
                 continue;
             };
             assert_eq!((summary.faults.len(), fault.lost), (1, 0), "{which}");
             assert!(fault.error.contains("Input/output error"), "{which}");
-            // The summary may be complete although its sync failed; everything before it is synced.
+            // If the sync of the summary fails, the summary may still be complete. Everything before it is synced.
             if fault.error.contains("the summary") {
                 continue;
             }
@@ -220,10 +221,10 @@ fn operation_failing_once_loses_nothing_and_is_stated() {
             let told: Vec<String> = losses.iter().map(ToString::to_string).collect();
             let is_told = told.iter().any(|told| told.contains(&fault.words()));
             assert!(is_told || fault.continued.is_none(), "{which}: {told:?}");
-            // The failed part has no end, whatever else it has.
+            // The failed part must have no end.
             let (_, alone) = read(&std::fs::read(&fault.path).unwrap());
             let is_cut = |loss: &Loss| matches!(loss.kind, LossKind::Truncated | LossKind::Framing);
-            // A part without synced content was removed and created anew.
+            // A part without synced content was removed, and created again under the same name.
             let is_anew = fault.continued.as_ref() == Some(&fault.path);
             assert!(is_anew || alone.iter().any(is_cut), "{which}: {alone:?}");
             if let [RecordingEvent::Failed { .. }, RecordingEvent::Resumed(resumed)] = events.as_slice() {
@@ -234,7 +235,7 @@ fn operation_failing_once_loses_nothing_and_is_stated() {
 }
 
 #[test]
-fn medium_failing_briefly_loses_nothing_and_permanently_only_later_messages() {
+fn brief_medium_fault_loses_nothing_and_permanent_fault_only_later_messages() {
     let (expected, ops) = without_faults("while", None);
     for from in header_ops()..ops {
         for lasts in [2, 5, u64::MAX] {
@@ -246,11 +247,11 @@ fn medium_failing_briefly_loses_nothing_and_permanently_only_later_messages() {
             let which = format!("{lasts} from operation {from} on: {:?}", summary.faults);
             let lost: u64 = summary.faults.iter().map(|fault| fault.lost).sum();
             assert_eq!(summary.messages + lost, 4 * TICKS, "{which}");
-            // Unsynced messages may still be present.
+            // Messages that were written but not synced may also be found.
             assert!(expected.starts_with(&seen) && seen.len() as u64 >= summary.messages, "{which}");
             let is_end = summary.faults.iter().all(|fault| fault.error.contains("the summary"));
             assert!(!summary.faults.is_empty() && (is_end || !losses.is_empty()), "{which}");
-            // The first part remains even if nothing else can be created.
+            // The first part is kept, even if no other part can be created.
             assert!(folder.0.join("dive.mcap").exists());
             if lasts < u64::MAX && from < ops / 2 {
                 assert_eq!((lost, seen.len()), (0, expected.len()), "{which}: {events:?}");
@@ -283,7 +284,7 @@ fn backlog_overflow_loses_and_counts_the_oldest_messages() {
     storage.store(false);
     let (seen, losses) = read_back(&folder);
     assert_eq!(seen.len() as u64, summary.messages);
-    // There is one gap, and the loss is stated with its two ends.
+    // The messages have one gap. The statement of the loss names the two ends of that gap.
     let times: Vec<u64> = seen.iter().map(|message| message.1).collect();
     let gaps: Vec<_> = times.windows(2).filter(|pair| pair[1] - pair[0] > 100_000_000).collect();
     let stated = losses.iter().find(
@@ -315,13 +316,15 @@ fn synced_messages_survive_a_power_cut_after_an_error() {
         storage.store(true);
         let (seen, losses) = read_back(&folder);
         assert!(expected.starts_with(&seen), "operation {at}");
-        // Half a second between syncs, and one step for the retry.
+        // Lost are at most half a second between syncs, and the step of the retry.
         assert!(seen.len() as u64 >= 4 * (TICKS / 2 - 7), "operation {at}: {}", seen.len());
         assert!(!losses.is_empty(), "operation {at}");
     }
 }
 
-/// Seconds of a dive that a kill loses if each sync takes `sync`. Each 20 ms bring a tick and 20 packets.
+/// Returns the seconds of a dive that a kill loses, if each sync takes `sync`.
+///
+/// Every 20 ms a tick and 20 packets arrive.
 fn lost_s(sync: Duration) -> f64 {
     const TICK: Duration = Duration::from_millis(20);
     let folder = Folder::new("slow syncs");
@@ -354,14 +357,14 @@ fn lost_s(sync: Duration) -> f64 {
         }
         now += waited();
     }
-    // Killed in the last moment of a sync, or between two.
+    // The program is killed at the end of a sync, or between two syncs.
     storage.store(false);
     let (seen, _) = read_back(&folder);
     now.as_secs_f64() - seen.last().unwrap().1 as f64 / 1e9
 }
 
 #[test]
-fn kill_loses_at_most_a_second_and_a_sync() {
+fn killed_program_loses_at_most_a_second_and_a_sync() {
     for sync_s in [0.001, 0.01, 0.1, 0.25, 0.5, 0.7, 1.0, 2.0, 5.0] {
         let lost = lost_s(Duration::from_secs_f64(sync_s));
         assert!(lost <= 1.0 + sync_s, "{lost} s are lost where a sync takes {sync_s} s");
@@ -369,7 +372,7 @@ fn kill_loses_at_most_a_second_and_a_sync() {
 }
 
 #[test]
-fn recording_with_a_fault_recovers_to_one_log_that_states_it() {
+fn recording_with_a_fault_is_recovered_as_one_log_that_states_it() {
     let folder = Folder::new("recovered");
     let mut syncs = 0;
     let storage = Faulty::new(move |op, _| {
@@ -387,7 +390,7 @@ fn recording_with_a_fault_recovers_to_one_log_that_states_it() {
     assert_eq!((recovered.len() as u64, losses.len()), (4 * TICKS, 1));
     let told = losses[0].to_string();
     assert!(told.contains(&summary.faults[0].words()), "{told}");
-    // The first part alone misses the rest and isn't a whole dive.
+    // The first part by itself misses the rest of the dive, and so isn't a whole dive.
     let first = recover(&mut || DiveLog::open(&files[..1]), &mut Vec::new(), &[], "first").unwrap();
     assert!(first.messages < 4 * TICKS);
     assert!(first.losses.iter().any(|loss| loss.kind == LossKind::Truncated), "{:?}", first.losses);

@@ -1,4 +1,4 @@
-//! Voice recordings in a dive's log don't affect anything else.
+//! Voice recordings in a dive's log, which must not affect any other message.
 
 #![expect(clippy::disallowed_types, reason = "a test's storage is asked about once a step")]
 
@@ -14,11 +14,11 @@ use super::super::voice::{NotKept, VoicePort, decode};
 use super::super::{Recorder, RecorderPort, RecorderWorker, Rotation, Storage, StoredFile};
 use super::*;
 
-/// Storage whose files hold a limited number of bytes; further writes fail.
+/// A storage whose files hold a limited number of bytes. Writes beyond that fail.
 #[derive(Clone, Default)]
 struct Small(Arc<Mutex<Files>>);
 
-/// Maximum number of bytes of each file, and the files' contents.
+/// Maximum number of bytes in a file, and content of each file.
 type Files = (usize, BTreeMap<PathBuf, Vec<u8>>);
 
 struct SmallFile(Small, PathBuf);
@@ -32,7 +32,7 @@ impl Small {
         self.0.lock().unwrap().0 = most_bytes;
     }
 
-    /// All messages of all files, in their order.
+    /// Returns the messages of all files, in order.
     fn read(&self) -> Vec<Seen> {
         self.0.lock().unwrap().1.values().flat_map(|bytes| read(bytes).0).collect()
     }
@@ -86,7 +86,7 @@ fn dive(storage: &Small) -> Dive {
 }
 
 impl Dive {
-    /// Records `ticks` ticks of a tenth of a second, each with one packet.
+    /// Records `ticks` ticks of a tenth of a second, with one packet each.
     fn go_on(&mut self, ticks: u64) {
         for tick in self.3..self.3 + ticks {
             let at = MonoNs((tick + 10) * 100_000_000);
@@ -98,7 +98,7 @@ impl Dive {
     }
 }
 
-/// Number of distinct packets. The next part repeats packets that weren't synced in the previous one.
+/// Returns the number of distinct packets. A part repeats packets that weren't synced in the previous part.
 fn packets(seen: &[Seen]) -> usize {
     let of_head = seen.iter().filter(|message| message.0 == "raw 0");
     of_head.map(|message| message.3).collect::<BTreeSet<_>>().len()
@@ -110,7 +110,7 @@ fn voices(seen: &[Seen]) -> Vec<Voice> {
 }
 
 #[test]
-fn voice_gets_the_log_time_of_the_previous_message() {
+fn voice_recording_gets_the_log_time_of_the_previous_message() {
     let storage = Small::of(usize::MAX);
     let mut dive = dive(&storage);
     dive.2.keep(&voice(1, 5000)).unwrap();
@@ -134,7 +134,7 @@ fn voice_gets_the_log_time_of_the_previous_message() {
 }
 
 #[test]
-fn voice_is_refused_while_recording_fails() {
+fn voice_recording_is_refused_while_the_medium_fails() {
     let storage = Small::of(usize::MAX);
     let mut dive = dive(&storage);
     dive.go_on(5);
@@ -150,7 +150,7 @@ fn voice_is_refused_while_recording_fails() {
 }
 
 #[test]
-fn waiting_voices_are_limited() {
+fn waiting_voice_recordings_are_limited() {
     let storage = Small::of(usize::MAX);
     let mut dive = dive(&storage);
     dive.go_on(1);
@@ -160,9 +160,9 @@ fn waiting_voices_are_limited() {
     assert_eq!(voices(&storage.read()).len(), 8);
 }
 
-/// The disk has room for packets but not for a voice recording.
+/// The disk has room for packets, but not for a voice recording.
 #[test]
-fn voice_without_room_is_dropped_and_the_dive_continues() {
+fn voice_recording_without_room_is_dropped_and_the_dive_continues() {
     let storage = Small::of(60_000);
     let mut dive = dive(&storage);
     dive.go_on(10);
