@@ -2,7 +2,8 @@
 //!
 //! A stationary count means either that the vehicle is stationary or that the wheel has stuck. A filter that trusts
 //! the count stops the vehicle in both cases. So the alternative hypothesis is kept beside it: the estimate without
-//! these corrections. Derivation: `docs/why/navigation.md`, "A count that stands".
+//! these corrections. Derivation: `docs/why/navigation.md`, "When cable
+//! and estimate disagree".
 
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,13 @@
 //!
 //! Within a spell of a few seconds, the vehicle's position and attitude absorb what they can. The parameters are
 //! fitted to the rest. Spells add up to blocks of distance. Blocks are about as independent as the wall allows, and
-//! their scatter gives the uncertainty of a figure. Derivation: `docs/why/navigation.md`, "Settings in doubt".
+//! their scatter gives the uncertainty of a figure. Summary: `docs/why/navigation.md`, "Settings in doubt".
+//!
+//! A residual is r = x b, with x the error of the setting and b as follows (t, A, p: as in the range's derivatives):
+//!
+//! - speed of sound, or a wider wall: b is the expected range
+//! - head turned about its axis a: b = (t - A x p) . a
+//! - head pitched or yawed on its mount: the same about that axis, without its constant part
 
 use serde::{Deserialize, Serialize};
 

@@ -264,8 +264,6 @@ fn compass_deviation_gives_no_residual() {
 }
 
 /// The turn rate is an input, so that the gyro bias is not an error of the row.
-///
-/// See "What is left out" in `docs/why/navigation.md`.
 #[test]
 fn velocity_and_rest_rows() {
     let mut draws = Draws::new(6);
