@@ -1,7 +1,7 @@
 //! Weight of head returns from bumps that the heads have seen before.
 //!
 //! A stationary vehicle sees the same bumps in every turn. If each turn counted as new information, the estimate
-//! would become wrong and overconfident. Derivation: `docs/why/navigation.md`, "Bumps seen again".
+//! would become wrong and overconfident. Derivation: `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
