@@ -3,7 +3,13 @@
 //! It detects differences that the data sheets do not explain. It uses only readings and the estimated chainage,
 //! and never the filter's covariance, gates or learnt noise. So it still works when the filter has settled on a
 //! wrong speed. The inertial unit is not compared here, because it only measures changes of speed; `slack_level.rs`
-//! compares it with the counter. Derivation: `docs/why/navigation.md`, "Distances compared without the filter".
+//! compares it with the counter.
+//!
+//! A difference counts over a window W beyond this limit, with n the counter's variance and v the log's noise:
+//!
+//! ```text
+//! 2 max(0.15 m, 3 slack_sd) + 5 sqrt(2 n + (scale distance)^2 + v^2 0.25 s W)
+//! ```
 
 use super::cable::CableDoubt;
 use super::settings::Settings;

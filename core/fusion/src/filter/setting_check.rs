@@ -3,7 +3,13 @@
 //! Each setting is a parameter that is fitted to the residuals. Within a spell of a few seconds, the vehicle's pose
 //! explains as much of the residuals as it can, and the parameters explain the rest. The sums of spells are added
 //! up over blocks of distance. Blocks are about as independent as the wall allows, so their scatter gives the
-//! uncertainty of a parameter. Derivation: `docs/why/navigation.md`, "Settings in doubt".
+//! uncertainty of a parameter. Summary: `docs/why/navigation.md`, "Settings in doubt".
+//!
+//! A residual is r = x b, with x the error of the setting and b as follows (t, A, p: as in the range's derivatives):
+//!
+//! - speed of sound, or a wider wall: b is the expected range
+//! - head turned about its axis a: b = (t - A x p) . a
+//! - head pitched or yawed on its mount: the same about that axis, without its constant part
 
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,19 @@
 //! the slack alone. At several lags, they are compared with the third differences of the slack model. If they are
 //! larger than declared, the slack is larger or faster. A single third difference far above the usual size means
 //! that the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it
-//! uses only the heading of the estimate. Derivation: `docs/why/navigation.md`, "Slack".
+//! uses only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
+//!
+//! With u the counter less the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant T:
+//!
+//! ```text
+//! d(L) = u(t) - 3 u(t - L) + 3 u(t - 2 L) - u(t - 3 L)
+//!
+//! mean square of d(L), the sum of:
+//!     slack                                                    sd^2 (20 - 30 c(L) + 12 c(2 L) - 2 c(3 L))
+//!     counter noise of variance n                              20 n
+//!     force noise f; walk w of tilt and accelerometer bias     f^2 L^3 + 0.55 w^2 L^5
+//!     gyro bias of variance P that wanders by q per second     g^2 P (1 - e^(-40 s q / P)) L^6
+//! ```
 
 use super::inertial::InertialSample;
 use super::settings::{GaussMarkov, Settings};

@@ -260,9 +260,7 @@ fn attitude_with_known_compass_deviation_has_no_residual() {
     }
 }
 
-/// The turn rate is an input of the row, so the row does not depend on the gyro bias.
-///
-/// See "Not modelled" in `docs/why/navigation.md`.
+/// The turn rate is an input, so that the gyro bias is not an error of the row.
 #[test]
 fn velocity_and_rest_rows_equal_differences() {
     let mut draws = Draws::new(6);
