@@ -1,12 +1,12 @@
-//! Computes the program's version for caches: the package's version, and a digest of the sources that decide a dive's
-//! results.
+//! Computes the program's version for caches from the package's version and a digest of the sources that decide a
+//! dive's results.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-/// Folders and files whose content decides results, from this package's folder.
+/// Folders and files whose content decides results, relative to this package's folder.
 const SOURCES: [&str; 6] =
     ["../../core", "../../replay/player", "../../plugins", "../../Cargo.toml", "src", "../Cargo.toml"];
 
@@ -39,7 +39,7 @@ fn main() -> std::io::Result<()> {
 fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     if path.is_dir() {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        // Tests and the page don't influence results.
+        // Tests and the page don't change results.
         if matches!(name.as_str(), "tests" | "node_modules" | "page" | "target") {
             return Ok(());
         }

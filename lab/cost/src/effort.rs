@@ -1,16 +1,17 @@
-//! Amount of measurement.
+//! Amount of measurement: a quick check or the full measurement.
 
 /// Amount of measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effort {
-    /// Under a minute of CPU: one or two seeds, short dives. It shows that everything works, and orders of magnitude.
+    /// Under a minute of CPU: one or two seeds, short dives. The result shows that everything works, and gives orders
+    /// of magnitude.
     Quick,
     /// Under ten minutes on two cores, as shown in `docs/why/cost`.
     Full,
 }
 
 impl Effort {
-    /// Picks one of two values.
+    /// Returns the value for this amount of measurement.
     pub fn pick<T>(self, quick: T, full: T) -> T {
         match self {
             Self::Quick => quick,
@@ -18,15 +19,15 @@ impl Effort {
         }
     }
 
-    /// Seeds of each scene, from 1 on.
+    /// Number of seeds of each scene; they are numbered from 1.
     pub fn seeds(self) -> u32 {
         self.pick(1, 5)
     }
 
     /// Number of times that every setting is measured, in turns.
     ///
-    /// Six is the fewest values whose median has a 95 % interval. With three values the interval is the least and the
-    /// largest.
+    /// At least six values are needed for a 95 % interval of the median. With three values, the interval is the least
+    /// and the largest value.
     pub fn rounds(self) -> u32 {
         self.pick(3, 9)
     }

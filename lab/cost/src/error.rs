@@ -5,7 +5,7 @@ use headrace_oracle::TruthError;
 use headrace_sampling::SamplingError;
 use headrace_simulator::SceneError;
 
-/// A trade can't be measured.
+/// A reason why a trade can't be measured.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CostError {
@@ -24,7 +24,7 @@ pub enum CostError {
     /// A file isn't among those built into the program.
     #[error("reading {name:?}: the program contains no such file; expected one of {known}")]
     NoFile {
-        /// Its name.
+        /// Name of the requested file.
         name: String,
         /// Names of the built-in files.
         known: String,
@@ -32,7 +32,7 @@ pub enum CostError {
     /// A figure that a trade needs isn't available.
     #[error("measuring {what}: {why}")]
     Figure {
-        /// The figure.
+        /// Name of the figure.
         what: String,
         /// The reason.
         why: String,

@@ -1,4 +1,4 @@
-//! `headrace-cost`, which `headrace cost` starts: command line, the folder of results, exit codes.
+//! `headrace-cost`, which `headrace cost` starts: its command line, the folder of results, and exit codes.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,9 +16,9 @@ use headrace_cost::scene::Inputs;
 use headrace_cost::trades::{GIVEN, TRADES};
 use headrace_vehicle::VehicleConfig;
 
-/// Last line of a picture, which marks it as written by this program.
+/// Last line of a picture. The line marks the picture as written by this program.
 const MARK: &str = "<!-- headrace cost -->\n";
-/// First text of a table.
+/// Beginning of a table. The text marks the table as written by this program.
 const TABLE: &str = "scene,method,knob,";
 
 /// Measure the cost of accuracy: errors against independent values, setting by setting, next to CPU time or hours.
@@ -62,7 +62,7 @@ struct Verbosity {
     quiet: bool,
 }
 
-/// There are no results.
+/// Error: there are no results.
 #[derive(Debug, thiserror::Error)]
 enum Failure {
     #[error(transparent)]
@@ -182,7 +182,7 @@ fn is_picture(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension == "svg")
 }
 
-/// The command line, without the folder of results.
+/// The command line, except for the folder of results.
 fn command(args: &Cost) -> String {
     let quick = if args.quick { " --quick" } else { "" };
     let only = if args.only.is_empty() { String::new() } else { format!(" --only {}", args.only.join(",")) };

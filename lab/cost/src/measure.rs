@@ -6,9 +6,10 @@ use std::thread;
 use crate::error::CostError;
 use crate::point::Interval;
 
-/// Runs untimed work for each item on as many threads as there are processors; results are in the order of the items.
+/// Runs untimed work for each item on as many threads as there are processors; the results are in the order of the
+/// items.
 ///
-/// Errors: that of the first item that fails.
+/// Errors: the error of the first item that fails.
 pub fn side_by_side<T: Sync, R: Send>(
     items: &[T],
     work: impl Fn(&T) -> Result<R, CostError> + Sync,
@@ -35,12 +36,12 @@ pub fn side_by_side<T: Sync, R: Send>(
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// Median of each setting's costs with its 95 % interval, measured in `rounds` turns.
+/// Measures each setting `rounds` times, in turns; returns the median cost of each setting with its 95 % interval.
 ///
 /// Measuring in turns spreads other load on the machine evenly over the settings. `run` measures a setting once and
 /// returns its cost.
 ///
-/// Errors: those of `run`; no rounds.
+/// Errors: an error of `run`; zero rounds.
 pub fn in_turns<T>(
     rounds: u32,
     settings: &[T],

@@ -1,4 +1,4 @@
-//! Measured points: a setting's error and cost, and the settings that no other beats.
+//! Measured points: each setting's error and cost, and the settings that no other setting beats.
 
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
@@ -22,14 +22,15 @@ impl Interval {
 
     /// Median with its 95 % interval by the sign test; `None` without values.
     ///
-    /// The interval lies between two values equally far from the least and the largest rank, the innermost with that
-    /// probability of covering the true median. For fewer than six values it is the least and the largest, which cover
-    /// the median with less probability.
+    /// The bounds are two values equally far from the least and the largest rank. They are the innermost pair that
+    /// covers the true median with a probability of at least 95 %. For fewer than six values, the bounds are the least
+    /// and the largest value, which cover the median with a smaller probability.
     pub fn median(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
         let count = i32::try_from(sorted.len()).ok()?;
-        // Probability that at most `below` of all values lie under the median: that of a fair coin.
+        // Probability that at most `below` of all values lie under the median. Each value does so with probability one
+        // half.
         let (mut ways, mut below, mut cut) = (1.0, 1.0, 0_usize);
         let all = (0..count).fold(1.0, |all, _| all * 2.0);
         for k in 1..=count / 2 {
@@ -70,28 +71,28 @@ impl Interval {
         Some(Self { low: middle - half, middle, high: middle + half })
     }
 
-    /// Converts to another unit; `factor` is the number of new units per old unit.
+    /// Converts the interval to another unit; `factor` is the number of new units per old unit.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self { low: self.low * factor, middle: self.middle * factor, high: self.high * factor }
     }
 }
 
-/// Interpolated quantile, with `share` from 0 to 1; `None` without values.
+/// Interpolated quantile at `share`, from 0 to 1; `None` without values.
 pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let rank = share.clamp(0.0, 1.0) * (sorted.len().checked_sub(1)? as f64);
     let below = usize::try_from(math::floor_to_i64(rank)).ok()?;
     let (from, part) = (*sorted.get(below)?, rank - below as f64);
-    // Equal or infinite neighbours are not subtracted.
+    // Equal or infinite neighbours are returned without interpolation, since infinity minus infinity is NaN.
     match sorted.get(below + 1) {
         Some(to) if part > 0.0 && *to > from => Some(from + part * (to - from)),
         _ => Some(from),
     }
 }
 
-/// 97.5 % quantile of Student's distribution. Source: its tables, three decimals.
+/// 97.5 % quantile of Student's t distribution. Source: published tables, three decimals.
 fn student(freedom: usize) -> f64 {
     const UP_TO_30: [f64; 30] = [
         12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145,
@@ -101,12 +102,12 @@ fn student(freedom: usize) -> f64 {
     UP_TO_30.get(freedom.max(1) - 1).copied().unwrap_or(1.96)
 }
 
-/// One of a point's errors; always finite.
+/// One of a point's errors. The values are always finite.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Error {
-    /// Name of the wrong quantity, as a table heading.
+    /// Name of the quantity that is in error, as a table heading.
     pub name: String,
-    /// Its unit.
+    /// Unit of the quantity.
     pub unit: String,
     /// Size of the error.
     pub interval: Interval,
@@ -115,49 +116,49 @@ pub struct Error {
 /// A measured setting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// Method: the line in the chart that this marker belongs to.
+    /// Method: the line in the chart that the marker belongs to.
     pub method: String,
     /// The setting's name.
     pub knob: String,
-    /// Its value, with its unit.
+    /// Value of the setting, with its unit.
     pub value: String,
-    /// The value as a number, if it is one.
+    /// The value as a number, if the value is numeric.
     pub number: Option<f64>,
-    /// Whether this is the shipped setting of headrace.
+    /// Whether this is headrace's shipped setting.
     pub is_default: bool,
-    /// The dived scene. Points of different scenes aren't compared, and each scene has its own chart.
+    /// Scene of the dives. Each scene has its own chart, and points of different scenes are not compared.
     pub scene: String,
     /// Number of seeds; each gives one dive.
     pub seeds: u32,
-    /// Its errors; the first one is shown on the axis.
+    /// Errors of the setting; the axis shows the first one.
     pub errors: Vec<Error>,
-    /// Its cost in the unit of the trade's axis: median, with the bounds that `Results::bars` explains.
+    /// Cost in the unit of the trade's axis: the median, with bounds as described by `Results::bars`.
     pub cost: Interval,
-    /// Counted instructions per unit of `cost`; `None` if they can't be counted.
+    /// Counted instructions per unit of `cost`; `None` if instructions can't be counted.
     pub instructions: Option<f64>,
-    /// Whether no other point beats it ([`front`]).
+    /// Whether no other point beats this one ([`front`]).
     pub on_front: bool,
 }
 
 impl Error {
-    /// An error by its name and unit.
+    /// Creates an error from its name, unit and interval.
     pub fn new(name: &str, unit: &str, interval: Interval) -> Self {
         Self { name: name.to_owned(), unit: unit.to_owned(), interval }
     }
 
-    /// Name and unit.
+    /// Name and unit as text.
     fn heading(&self) -> String {
         format!("{}, {}", self.name, self.unit)
     }
 }
 
 impl Point {
-    /// The error shown on the axis: the middle of the first one, infinite without any.
+    /// The error shown on the axis: the middle value of the first error; infinite if there are no errors.
     pub fn error(&self) -> f64 {
         self.errors.first().map_or(f64::INFINITY, |error| error.interval.middle)
     }
 
-    /// A figure by its name and unit, as [`Trade::figures`] lists them.
+    /// Finds an error by its name and unit, as listed by [`Trade::figures`].
     pub(crate) fn figure(&self, named: &str) -> Option<Interval> {
         self.errors.iter().find(|error| error.heading() == named).map(|error| error.interval)
     }
@@ -175,57 +176,58 @@ pub struct LeftOut {
 /// Error of the reference itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OracleError {
-    /// How it was found: the two references compared, and the place.
+    /// Method by which the error was found: the two references compared, and the place.
     pub how: String,
     /// Largest difference, in the unit of the trade's first error.
     pub size: f64,
 }
 
-/// An answered question of the kind "what does more of this cost".
+/// A question of the kind "what does more of this cost", with its answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trade {
-    /// Its name in `--only` and in names of files.
+    /// Name of the trade in `--only` and in file names.
     pub name: String,
-    /// Its heading.
+    /// Heading of the trade.
     pub title: String,
     /// The question.
     pub question: String,
-    /// Name and unit of the axis to the right.
+    /// Name and unit of the x axis.
     pub error_axis: String,
-    /// Name and unit of the axis upwards.
+    /// Name and unit of the y axis.
     pub cost_axis: String,
     /// Unit of the cost, as in a sentence: "ns a return".
     pub cost_unit: String,
-    /// Whether cost is computed rather than measured, so that it doesn't differ from run to run.
+    /// Whether the cost is computed rather than measured. A computed cost does not vary from run to run.
     pub cost_is_computed: bool,
-    /// The error below which accuracy decides nothing: a tenth of the target, or the speed margin of the advice.
+    /// The error below which more accuracy changes no decision: a tenth of the target, or the speed margin of the
+    /// advice.
     pub decides: Option<f64>,
     /// Measured points.
     pub points: Vec<Point>,
-    /// Settings that weren't measured, or failed.
+    /// Settings that were not measured, or whose measurement failed.
     pub left_out: Vec<LeftOut>,
     /// The reference's own error.
     pub oracle: OracleError,
-    /// For each default that another setting beats, a sentence that explains why it stays.
+    /// For each default that another setting beats, a sentence that explains why the default is kept.
     pub reasons: Vec<String>,
-    /// The conclusion, with a number.
+    /// The conclusion, with at least one number.
     pub advice: String,
 }
 
 impl Trade {
-    /// Unit of the axis to the right.
+    /// Unit of the x axis.
     pub(crate) fn error_unit(&self) -> &str {
         self.error_axis.rsplit(", ").next().unwrap_or_default()
     }
 
-    /// Largest difference of the error that decides nothing, in the unit of the error.
+    /// Largest difference of the error that counts as no difference, in the unit of the error.
     ///
-    /// It is a tenth of the deciding error, and at least the reference's own error.
+    /// This is a tenth of the deciding error, and at least the reference's own error.
     pub fn resolution(&self) -> f64 {
         self.oracle.size.max(self.decides.map_or(0.0, |decides| decides / 10.0))
     }
 
-    /// Names and units of all figures of its points, in the order of first appearance.
+    /// Names and units of all figures of the points, in the order of first appearance.
     pub(crate) fn figures(&self) -> Vec<String> {
         let mut figures: Vec<String> = Vec::new();
         for heading in self.points.iter().flat_map(|point| &point.errors).map(Error::heading) {
@@ -236,7 +238,7 @@ impl Trade {
         figures
     }
 
-    /// Scenes in the order of their first points.
+    /// Scenes, in the order of their first points.
     pub fn scenes(&self) -> Vec<&str> {
         let mut scenes: Vec<&str> = Vec::new();
         for point in &self.points {
@@ -248,24 +250,24 @@ impl Trade {
     }
 }
 
-/// A table beside the trades: costs of things that aren't a choice.
+/// A table shown beside the trades: costs of properties that are not a choice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Given {
-    /// Its heading.
+    /// Heading of the table.
     pub title: String,
     /// Explanation, one paragraph.
     pub text: String,
-    /// Headings of its columns.
+    /// Headings of the columns.
     pub columns: Vec<String>,
-    /// Its rows.
+    /// Rows of the table.
     pub rows: Vec<Vec<String>>,
 }
 
-/// Marks the points that no other point of their scene beats.
+/// Marks the points of the front: points that no other point of their scene beats.
 ///
-/// A point beats another if it is no worse in error and cost, and clearly better in one. Clearly better means an error
-/// smaller by more than `resolution`, or a cost whose upper bound is below the other's lower bound. Noise in the costs
-/// of equal settings therefore beats neither.
+/// A point beats another point if its error and cost are no worse and one of them is clearly better. An error is
+/// clearly better if it is smaller by more than `resolution`. A cost is clearly better if its upper bound is below the
+/// other's lower bound. Noise in the costs of equal settings therefore removes no point from the front.
 pub fn front(points: &mut [Point], resolution: f64) {
     let beats = |one: &Point, other: &Point| {
         let (error, others) = (one.error(), other.error());
@@ -285,8 +287,8 @@ pub fn front(points: &mut [Point], resolution: f64) {
 /// The knee of a scene's front: the point farthest below the straight line between the front's ends, on logarithmic
 /// axes.
 ///
-/// Errors below `resolution` count as `resolution`, and of those only the cheapest is on the front. `None` if fewer
-/// than three points remain, or none lies below the line.
+/// Errors below `resolution` count as `resolution`, and only the cheapest of these points is on the front. `None` if
+/// fewer than three points remain, or if no point lies below the line.
 pub fn knee<'a>(points: &'a [Point], scene: &str, resolution: f64) -> Option<&'a Point> {
     let told = |point: &Point| point.error().max(resolution);
     let mut on_front: Vec<(&Point, [f64; 2])> = points
@@ -343,20 +345,20 @@ mod tests {
     }
 
     #[test]
-    fn noise_of_equal_settings_beats_neither() {
+    fn noise_keeps_equal_settings_on_the_front() {
         let mut points = [point("a", 0.01, [9.0, 10.0, 11.0]), point("b", 0.01, [9.5, 10.4, 11.5])];
         assert_eq!(on_front(&mut points), ["a", "b"]);
     }
 
     #[test]
-    fn points_of_other_scenes_beat_nothing() {
+    fn points_of_another_scene_are_not_compared() {
         let mut elsewhere = point("there", 0.001, [1.0; 3]);
         elsewhere.scene = "elsewhere".to_owned();
         assert_eq!(on_front(&mut [point("here", 0.01, [9.0; 3]), elsewhere]), ["here", "there"]);
     }
 
     #[test]
-    fn the_knee_lies_farthest_below_the_line_between_the_ends() {
+    fn knee_lies_farthest_below_the_line_between_the_ends() {
         let mut points = [
             point("finest", 0.001, [1000.0; 3]),
             point("knee", 0.01, [20.0; 3]),
@@ -366,7 +368,7 @@ mod tests {
         front(&mut points, 0.0);
         assert_eq!(knee(&points, "s", 0.0).map(|point| point.value.as_str()), Some("knee"));
         assert!(knee(&points[..2], "s", 0.0).is_none() && knee(&points, "another", 0.0).is_none());
-        // Finest and knee then have the same error, and the cheaper one becomes an end of the front.
+        // Otherwise the finest point and the knee have the same error, and the cheaper one becomes an end of the front.
         assert_eq!(knee(&points, "s", 0.02).map(|point| point.value.as_str()), Some("near the line"));
         assert!(knee(&points, "s", 0.2).is_none());
     }
@@ -375,7 +377,7 @@ mod tests {
     fn spreads_match_published_tables() {
         let values = [4.0, 1.0, 3.0, 2.0, 5.0];
         assert_eq!(Interval::quartiles(&values), Some(Interval { low: 2.0, middle: 3.0, high: 4.0 }));
-        // Mean 3, variance 2.5; t of four degrees of freedom is 2.776.
+        // The mean is 3 and the variance 2.5; t for four degrees of freedom is 2.776.
         let mean = Interval::mean(&values).unwrap();
         assert!((mean.middle - 3.0).abs() < 1e-12 && (mean.high - 4.963).abs() < 1e-3, "{mean:?}");
         assert_eq!(Interval::mean(&[1.0]), None);

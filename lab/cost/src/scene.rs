@@ -23,9 +23,9 @@ pub const FILES: [(&str, &str); 11] = [
     ("vita1-field.toml", include_str!("../../../deploy/scenes/vita1-field.toml")),
 ];
 
-/// The content of a built-in file, by its name without folders.
+/// Content of a built-in file, found by its name without folders.
 ///
-/// Errors: there is no file of that name.
+/// Errors: no built-in file has that name.
 pub fn file(name: &str) -> Result<&'static str, CostError> {
     let plain = name.rsplit('/').next().unwrap_or(name);
     let found = FILES.iter().find(|(known, _)| *known == plain).map(|(_, text)| *text);
@@ -42,12 +42,12 @@ pub struct Inputs<'a> {
     pub effort: Effort,
     /// The kinds of devices that vehicle files may name.
     pub kinds: &'a [&'a dyn DeviceKind],
-    /// A vehicle file of the user's own: its name and text.
+    /// Name and text of the user's own vehicle file, if any.
     pub vehicle: Option<(&'a str, &'a str)>,
 }
 
 impl Inputs<'_> {
-    /// Parses a scene with a seed; vehicle files and the files that they name are the built-in ones.
+    /// Parses a scene with a seed. Vehicle files, and the files that they name, are the built-in ones.
     ///
     /// Errors: the scene is invalid.
     pub fn scene(&self, text: &str, seed: u32) -> Result<Scene, CostError> {
@@ -57,7 +57,7 @@ impl Inputs<'_> {
         Ok(Scene::parse(document, self.kinds, &load, Some(u64::from(seed)))?)
     }
 
-    /// Parses a scene with this text as its vehicle file, whatever name the scene gives it.
+    /// Parses a scene with the given text as its vehicle file, whatever file the scene names.
     ///
     /// Errors: the scene or the vehicle is invalid.
     pub fn scene_of(&self, text: &str, vehicle: &str, seed: u32) -> Result<Scene, CostError> {

@@ -4,26 +4,26 @@
 use crate::point::{Error, Interval, quantile};
 use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
-/// Length at the ends of a dive, beyond the target, in which sections have neighbours on one side only, m.
+/// Length at each end of a dive, beyond the target, in which sections have neighbours on one side only, m.
 ///
-/// It is the length of the hull and the distance to the next pass.
+/// This is the length of the hull plus the distance to the next pass.
 pub const END_M: f64 = 2.0;
 
-/// A section as judged by some method, with its truth.
+/// A section as judged by a method, with its true hole.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
-    /// Its length, m.
+    /// Length of the section, m.
     pub length_m: f64,
-    /// D as judged, m; `None` if there is none, or only a lower bound.
+    /// D as judged, m; `None` if D is unknown, or only bounded from below.
     pub hole_m: Option<f64>,
-    /// Whether it is within the target; `None` if undecided.
+    /// Whether the section is within the target; `None` if undecided.
     pub passes: Option<bool>,
     /// D_true, m.
     pub true_hole_m: f64,
 }
 
 impl Judged {
-    /// The section as in the report.
+    /// The section as judged in the report.
     pub fn of(section: &JudgedSection) -> Self {
         Self {
             length_m: section.report.end_m - section.report.start_m,
@@ -38,7 +38,7 @@ impl Judged {
     }
 }
 
-/// The sections of a dive away from its ends.
+/// The sections of a dive, except those near its ends.
 pub fn inner(dive: &JudgedDive) -> impl Iterator<Item = &JudgedSection> {
     let end_m = END_M + dive.report.target_m;
     let [least_m, most_m] = dive.truth.way_m;
@@ -50,9 +50,9 @@ pub fn inner(dive: &JudgedDive) -> impl Iterator<Item = &JudgedSection> {
 
 /// The errors of a setting, from the sections of each of its dives.
 ///
-/// They are |D - D_true|, 95th percentile and median; metres per 100 m falsely passed, falsely failed and undecided;
-/// and the share of sections over the target that passes. Each is the median over the dives with the least and the
-/// most. Dives without such sections are left out.
+/// The errors are the 95th percentile and the median of |D - D_true|; the metres per 100 m falsely passed, falsely
+/// failed and undecided; and the share of sections over the target that pass. Each value is the median over the dives,
+/// with the least and the largest as bounds. A dive without the sections that an error needs is left out.
 pub fn errors(dives: &[Vec<Judged>], target_m: f64) -> Vec<Error> {
     let off_m = |dive: &Vec<Judged>| -> Vec<f64> {
         let off = |judged: &Judged| Some((judged.hole_m? - judged.true_hole_m).abs());
@@ -107,7 +107,7 @@ mod tests {
         let found = errors(&[dive], 0.5);
         let middle: Vec<f64> =
             found.iter().map(|error| (error.interval.middle * 1e9).round() * 1e-9).collect();
-        // Off by 0, 0.2, 0.1 and 0.1 m; a metre holds all four.
+        // The errors are 0, 0.2, 0.1 and 0.1 m; the four sections are a metre long together.
         assert_eq!(middle, [0.185, 0.1, 25.0, 25.0, 25.0, 50.0]);
     }
 

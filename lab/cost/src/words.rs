@@ -63,7 +63,7 @@ pub(crate) fn steps(trade: &Trade, scene: &str) -> Vec<String> {
     lines
 }
 
-/// Text if no setting has less error than the default, or none by a deciding amount.
+/// Text for a scene in which no setting has a smaller error than the default, or none by a deciding amount.
 fn no_step(default: &Point, resolution: f64) -> String {
     let by = default.errors.first().filter(|_| resolution > 0.0);
     let by =
@@ -75,7 +75,7 @@ fn signed(value: f64) -> String {
     if value >= 0.0 { format!("{} more", number(value)) } else { format!("{} less", number(-value)) }
 }
 
-/// For each scene with a beaten default: the setting that beats it, or a statement that the default is on the front.
+/// For each scene, the setting that beats the default, or a statement that the default is on the front.
 pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
     let mut lines = Vec::new();
     for scene in trade.scenes() {

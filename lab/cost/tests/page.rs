@@ -14,7 +14,7 @@ use headrace_simulator::Scene;
 
 const TARGET_M: f64 = 0.5;
 
-/// The clone's root.
+/// Root folder of the repository.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
@@ -26,11 +26,11 @@ fn ideal() -> JudgedDive {
     dive(&scene).unwrap()
 }
 
-/// Ideal except for motion within a turn and occlusion.
+/// A scene whose only effects are motion within a turn and occlusion.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.1\n\
          [effects]\nmotion_within_turn = {}\nocclusion = {}\n";
 
-/// Median of |D - D_true|, metres in 100 falsely failed.
+/// Median of |D - D_true|, m, and metres in 100 m that falsely fail.
 fn wrong(dive: &JudgedDive, judged: impl Fn(Judged) -> Judged) -> [f64; 2] {
     let sections: Vec<Judged> = inner(dive).map(|section| judged(Judged::of(section))).collect();
     assert!(sections.len() > 8, "{} sections", sections.len());
@@ -68,7 +68,7 @@ fn page_in_docs_matches_its_data() {
             ""
         };
         let content = format!("{content}{end}");
-        // Renews the form only; the measured times stay.
+        // Renews the layout only; the measured times stay.
         if std::env::var_os("HEADRACE_RENEW_COST").is_some() {
             std::fs::write(folder.join(name), &content).unwrap();
         }
@@ -91,7 +91,7 @@ fn page_in_docs_matches_its_data() {
     }
 }
 
-/// Limits the share that shipped defaults pass among sections whose D_true is over the target.
+/// Among sections whose D_true is over the target, the shipped defaults may pass only a small share.
 #[test]
 fn shipped_defaults_pass_few_sections_over_the_target() {
     let text = std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap();

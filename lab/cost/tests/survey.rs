@@ -1,5 +1,6 @@
-//! Tests that the trade Survey keeps its plans. `tests/tests/sampling/survey.rs` tests that it agrees with `headrace
-//! plan`.
+//! Tests that simulated dives keep the plans of the trade Survey.
+//!
+//! `tests/tests/sampling/survey.rs` tests that the plans agree with `headrace plan`.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
@@ -24,7 +25,7 @@ fn hours_add_up_and_true_holes_stay_within_the_planned_target() {
             |name: &str| point.errors.iter().find(|error| error.name == name).unwrap().interval.middle;
         let hours = figure("there") + figure("back") + figure("again");
         assert!((point.cost.middle - hours).abs() < 1e-9, "{point:?}");
-        // The plan is kept.
+        // The dive keeps its plan.
         let hole_m = point.errors.iter().find(|error| error.name.starts_with("largest D_true"));
         if let Some(hole_m) = hole_m.filter(|_| !point.method.contains(" m off")) {
             assert!(hole_m.interval.middle <= point.error(), "{point:?}");

@@ -1,5 +1,5 @@
 //! Results that the trades of `headrace cost` must give on any machine: planted differences are found, and equal
-//! settings are equal.
+//! settings give equal results.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
@@ -17,7 +17,7 @@ fn measured(measure: Measure) -> Trade {
     measure(&inputs(), &mut |_| {}).unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// A figure of the only point with this scene, method and value.
+/// Finds a figure of the only point with this scene, method and value.
 fn figure(trade: &Trade, [scene, method, value]: [&str; 3], name: &str) -> f64 {
     let is = |point: &&Point| point.scene.contains(scene) && point.method == method && point.value == value;
     let found: Vec<&Point> = trade.points.iter().filter(is).collect();
@@ -26,7 +26,7 @@ fn figure(trade: &Trade, [scene, method, value]: [&str; 3], name: &str) -> f64 {
     error.unwrap_or_else(|| panic!("{name} of {scene}, {method}, {value}")).interval.middle
 }
 
-/// Asserts that each line with a default has one, and that each trade has advice.
+/// Asserts that each line that should have a default has one, and that each trade has advice.
 fn is_whole(trade: &Trade) {
     let defaults = trade.points.iter().filter(|point| point.is_default).count();
     assert!(defaults > 0, "{}: no default", trade.name);
@@ -51,7 +51,7 @@ fn filter_beats_the_cable_and_each_knob_has_an_effect() {
     assert!(within("slack cable", "filter, sonar returns") < 60.0, "a cable looser than told shows");
     let slack = |scene: &str| of(scene, "cable only", "displacement between passes");
     assert!(slack("VITA 1, slack") > 2.0 * slack("VITA 1, field"), "a slack three times as large");
-    // A setting without effect would give the default to the last bit.
+    // A setting without effect would give exactly the default's result.
     let field = |method: &str, value: &str| {
         figure(&trade, ["VITA 1, field", method, value], "position across").to_bits()
     };
@@ -117,9 +117,9 @@ fn leaving_nothing_out_changes_nothing_and_rays_converge() {
     );
 }
 
-/// Confidence has a price: at k standard deviations the plan is for a hole of T - k (sigma - 2 mm).
+/// Confidence has a price: at k standard deviations sigma, the plan is for a hole of T - k (sigma - 2 mm).
 #[test]
-fn hours_of_confidence_equal_those_of_a_smaller_target() {
+fn hours_with_confidence_equal_hours_with_a_smaller_target() {
     let trade = measured(sureness::measure);
     is_whole(&trade);
     let inputs = inputs();

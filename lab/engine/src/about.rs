@@ -1,16 +1,16 @@
 //! Facts about a dive that aren't in its log: plant, pilot, day.
 //!
-//! They come from `dives.csv` in the campaign's folder. Without that file, the plant is the first folder on the log's
-//! path, and the day that of the log's clock.
+//! The facts come from `dives.csv` in the campaign's folder. Without that file, the plant is the first folder on the
+//! log's path, and the day comes from the log's clock.
 
 use std::collections::BTreeMap;
 
 use crate::error::Error;
 use crate::place::Place;
 
-/// Name of the file.
+/// Name of the file with the facts.
 pub const FILE: &str = "dives.csv";
-/// Its columns; all but `log` may be missing or empty.
+/// Columns of the file. The column `log` is required; the others may be missing or empty.
 const COLUMNS: [&str; 4] = ["log", "plant", "pilot", "day"];
 
 /// Facts about a dive that aren't in its log.
@@ -31,7 +31,7 @@ pub struct Abouts(BTreeMap<String, About>);
 impl Abouts {
     /// Reads `dives.csv` of a place.
     ///
-    /// Errors: it can't be read; a column or a day is invalid.
+    /// Errors: the file can't be read; a column or a day is invalid.
     pub async fn read(place: &Place) -> Result<Self, Error> {
         match place.text(FILE).await? {
             Some(text) => Self::parse(&format!("{}{FILE}", place.url()), &text),
@@ -81,7 +81,7 @@ impl Abouts {
         about
     }
 
-    /// Logs named in the file that aren't among `logs`.
+    /// Logs that the file names but `logs` doesn't contain.
     pub fn beyond<'a>(&'a self, logs: &[String]) -> Vec<&'a str> {
         self.0.keys().filter(|log| !logs.contains(log)).map(String::as_str).collect()
     }
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn file_overrides_the_path() {
+    fn dives_csv_overrides_the_path() {
         let all =
             Abouts::parse("dives.csv", "log, pilot,day\na/x.mcap,Ada,1970-01-03\n\"b,c.mcap\",,\n").unwrap();
         let of = |log: &str, us| all.of(log, us);

@@ -1,9 +1,9 @@
 //! Caches tables of dives as Parquet files, by program version, parameters and the log's digest.
 //!
 //! The files are `CACHE/VERSION/PARAMETERS/DIVE/sections.parquet` and so on. A dive's folder is built elsewhere and
-//! then renamed, so it exists completely or not at all, even if a process is killed. Its `whole.json` has the length
-//! and digest of each file; a dive with a differing file is made again. `CACHE/known` stores the digests of logs by
-//! path, length and modification time.
+//! then renamed. It therefore exists completely or not at all, even if a process is killed. The folder's `whole.json`
+//! has the length and digest of each file. A dive is made again if a file differs from its digest. `CACHE/known` stores
+//! the digests of logs by path, length and modification time.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -21,11 +21,11 @@ use sha2::{Digest, Sha256};
 use crate::error::{Error, of_file};
 use crate::place::DiveLog;
 
-/// The list of a dive's files.
+/// Name of the file that lists a dive's files.
 const WHOLE: &str = "whole.json";
-/// Folder for unfinished work.
+/// Folder for unfinished dives.
 const SCRATCH: &str = "unfinished";
-/// Folder of logs' digests.
+/// Folder for the digests of logs.
 const KNOWN: &str = "known";
 
 /// A folder of finished dives. Several processes may use it at the same time.
@@ -34,7 +34,7 @@ pub struct Cache {
     folder: PathBuf,
 }
 
-/// A file as it was written.
+/// Length and digest of a file as written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Written {
     bytes: u64,
@@ -46,16 +46,16 @@ struct Written {
 pub enum Found {
     /// Complete and unchanged.
     Whole,
-    /// Not in the cache.
+    /// Missing from the cache.
     Nothing,
-    /// Changed since it was written, with the reason.
+    /// Changed after the dive was stored, with a description of the change.
     Broken(String),
 }
 
 impl Cache {
-    /// Opens a cache in a folder, which is created if it doesn't exist.
+    /// Opens a cache in a folder, and creates the folder if necessary.
     ///
-    /// Errors: it can't be created.
+    /// Errors: the folder can't be created.
     pub fn open(folder: &Path) -> Result<Self, Error> {
         for name in [SCRATCH, KNOWN] {
             let path = folder.join(name);
@@ -65,12 +65,12 @@ impl Cache {
         Ok(Self { folder })
     }
 
-    /// Its folder.
+    /// Folder of the cache.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Folder for unfinished work.
+    /// Folder for unfinished dives.
     pub fn scratch(&self) -> PathBuf {
         self.folder.join(SCRATCH)
     }
@@ -85,7 +85,7 @@ impl Cache {
         dive.join(format!("{table}.parquet"))
     }
 
-    /// Checks a dive's folder; reads all of it.
+    /// Checks a dive's folder. The check reads all files.
     pub fn look(dive: &Path) -> Found {
         let whole = match fs::read_to_string(dive.join(WHOLE)) {
             Ok(text) => text,
@@ -110,7 +110,7 @@ impl Cache {
 
     /// Stores a dive's tables, unless another process has already stored them.
     ///
-    /// Errors: they can't be written.
+    /// Errors: the tables can't be written.
     pub fn keep(&self, dive: &Path, tables: &Tables) -> Result<(), Error> {
         let scratch = self.scratch();
         let beside = tempfile::tempdir_in(&scratch).map_err(of_file("making a folder in", &scratch))?;
@@ -131,7 +131,7 @@ impl Cache {
         }
         match fs::rename(beside.path(), dive) {
             Ok(()) => {
-                // After the rename, the temporary folder must not be removed any more.
+                // The temporary folder must not be removed after the rename.
                 let _gone = beside.keep();
                 Ok(())
             }
@@ -142,7 +142,7 @@ impl Cache {
 
     /// Moves a broken dive's folder away and removes it.
     ///
-    /// Errors: it can't be moved.
+    /// Errors: the folder can't be moved.
     pub fn discard(&self, dive: &Path) -> Result<(), Error> {
         let scratch = self.scratch();
         let beside = tempfile::tempdir_in(&scratch).map_err(of_file("making a folder in", &scratch))?;
@@ -154,7 +154,7 @@ impl Cache {
         }
     }
 
-    /// The stored digest of a log that hasn't changed since.
+    /// Finds the stored digest of a log; `None` if the log has changed since it was stored.
     pub fn known(&self, place: &str, dive: &DiveLog) -> Option<String> {
         let text = fs::read_to_string(self.known_path(place, dive)).ok()?;
         Some(text).filter(|text| text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit()))
@@ -162,7 +162,7 @@ impl Cache {
 
     /// Stores the digest of a log.
     ///
-    /// Errors: it can't be written.
+    /// Errors: the digest can't be written.
     pub fn remember(&self, place: &str, dive: &DiveLog, sha256: &str) -> Result<(), Error> {
         let (path, scratch) = (self.known_path(place, dive), self.scratch());
         let file =
@@ -191,7 +191,7 @@ impl Cache {
 
 /// Writes a Parquet file.
 ///
-/// Errors: it can't be written.
+/// Errors: the file can't be written.
 pub(crate) fn write(path: &Path, batch: &RecordBatch) -> Result<(), Error> {
     let file = File::create(path).map_err(of_file("writing", path))?;
     let level = ZstdLevel::default();

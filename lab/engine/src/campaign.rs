@@ -29,14 +29,14 @@ use crate::provider::{ReplayFunction, ReplayTable, Replayed};
 /// Prefix of the tables of another program version.
 pub const BEFORE: &str = "before_";
 
-/// The dives of a place, with parameters.
+/// The dives of a place, and the parameters of their replays.
 #[derive(Debug)]
 pub struct Campaign {
-    /// Where the logs are.
+    /// Location of the logs.
     pub place: Place,
     /// The dives, in the order of their paths.
     pub dives: Vec<DiveLog>,
-    /// Parameters of their replays.
+    /// Parameters of the replays.
     pub parameters: Parameters,
     /// Makes the tables.
     pub maker: Arc<Maker>,
@@ -44,7 +44,7 @@ pub struct Campaign {
     elsewhere: Option<Elsewhere>,
 }
 
-/// A session that runs in other processes, and a folder that they can access too.
+/// A session that runs in other processes, and a folder shared with these processes.
 struct Elsewhere {
     session: SessionContext,
     folder: TempDir,
@@ -59,11 +59,11 @@ impl std::fmt::Debug for Elsewhere {
 /// The dives of a campaign with their tables.
 #[derive(Debug)]
 pub struct Finished {
-    /// Each dive with its tables. Of several copies of a log only the first is included.
+    /// Each dive with its tables. If a log has several copies, only the first copy is included.
     pub dives: Vec<(DiveLog, Made)>,
-    /// Logs that are copies of another log: both paths.
+    /// Logs that are copies of another log: path of the copy, path of the other log.
     pub copies: Vec<(String, String)>,
-    /// Logs named in `dives.csv` that aren't among the dives.
+    /// Logs that `dives.csv` names but that are not among the dives.
     pub unknown: Vec<String>,
     /// The table `dives`.
     pub table: RecordBatch,
@@ -87,9 +87,9 @@ impl Campaign {
         Ok(Self { place, dives, parameters, maker, threads: threads.max(1), elsewhere: None })
     }
 
-    /// Runs replays and queries in a session of other processes, which use the same cache.
+    /// Makes the campaign run replays and queries in a session of other processes, which use the same cache.
     ///
-    /// Errors: the cache can't be written.
+    /// Errors: a folder in the cache can't be made.
     pub fn send_to(&mut self, session: SessionContext) -> Result<(), Error> {
         let scratch = self.maker.cache().scratch();
         let folder = tempfile::tempdir_in(&scratch).map_err(of_file("making a folder in", &scratch))?;
@@ -97,7 +97,7 @@ impl Campaign {
         Ok(())
     }
 
-    /// Keeps only every `of`-th dive, beginning with number `shard`, from 1.
+    /// Keeps every `of`-th dive, starting with dive number `shard` (counted from 1), and drops the others.
     pub fn keep_shard(&mut self, shard: usize, of: usize) {
         let mut number = 0;
         self.dives.retain(|_| {
@@ -153,10 +153,10 @@ impl Campaign {
         Ok(all)
     }
 
-    /// Has a session's processes make the dives that the cache doesn't contain; returns them by log.
+    /// Makes the processes of a session replay the dives that the cache lacks; returns all dives by log.
     ///
-    /// If a process ends and loses its answers, its finished dives are in the cache. The others are sent again, as long
-    /// as their number decreases.
+    /// A process that ends early loses its answers, but its finished dives are in the cache. The other dives are sent
+    /// again, as long as their number decreases.
     async fn made_by(&self, session: &SessionContext) -> Result<BTreeMap<String, Made>, Error> {
         let (mut made, mut wanted) = self.looked_for(self.dives.clone()).await?;
         self.maker.counts().add(wanted.len(), made.len());
@@ -181,7 +181,7 @@ impl Campaign {
         Ok(made)
     }
 
-    /// Splits dives into those in the cache, by log, and the others.
+    /// Separates dives that are in the cache, returned by log, from dives that are not.
     async fn looked_for(&self, dives: Vec<DiveLog>) -> Result<(BTreeMap<String, Made>, Vec<DiveLog>), Error> {
         let looking = dives.into_iter().map(|dive| async move {
             let kept = self.maker.kept(&self.place, &dive, &self.parameters).await?;
@@ -198,7 +198,7 @@ impl Campaign {
         Ok((found, missing))
     }
 
-    /// Has dives replayed by a session's processes.
+    /// Makes the processes of a session replay dives; returns the dives by log.
     async fn replayed_by(
         &self,
         session: &SessionContext,
@@ -231,9 +231,9 @@ impl Campaign {
         Ok(made)
     }
 
-    /// A dive that another process reports as made.
+    /// Finds a dive that another process has replayed.
     ///
-    /// Errors: it isn't in this cache.
+    /// Errors: the dive is not in this process's cache.
     fn seen(&self, sha256: &str) -> Result<Made, Error> {
         let folder = self.maker.cache().dive(&self.parameters.digest(), sha256);
         if !folder.exists() {
@@ -315,8 +315,8 @@ impl Campaign {
         register_listed(session, name, schema, folders.iter().map(|folder| Cache::table(folder, table)))
     }
 
-    /// Registers rows as a table. Other processes can't read this process's memory, so for them the rows are written to
-    /// a file.
+    /// Registers rows as a table. Other processes can't read this process's memory, so the rows are written to a file
+    /// for them.
     fn register_batch(&self, session: &SessionContext, name: &str, rows: RecordBatch) -> Result<(), Error> {
         let Some(elsewhere) = &self.elsewhere else {
             let table = MemTable::try_new(rows.schema(), vec![vec![rows]])?;
@@ -328,7 +328,7 @@ impl Campaign {
         register_listed(session, name, rows.schema(), std::iter::once(path))
     }
 
-    /// The other program version with most dives of these parameters in the cache.
+    /// The program version, other than this one, that has replayed the most dives of these parameters in the cache.
     fn other_version(&self) -> Option<String> {
         let versions = std::fs::read_dir(self.maker.cache().folder()).ok()?.filter_map(Result::ok);
         let counted = versions.filter_map(|entry| {
@@ -339,7 +339,7 @@ impl Campaign {
         counted.max().map(|(_, name)| name)
     }
 
-    /// Folders of the dives as replayed by another version, if complete in the cache.
+    /// Folders of the dives as replayed by another version. Only complete dives are included.
     fn earlier(&self, version: &str, finished: &Finished) -> Vec<PathBuf> {
         let folder = self.maker.cache().folder().join(version).join(self.parameters.digest());
         let kept = finished.dives.iter().filter_map(|(_, made)| match made {
@@ -351,7 +351,7 @@ impl Campaign {
 }
 
 impl Finished {
-    /// Number of dives that couldn't be replayed, and number that lost data.
+    /// Number of dives that couldn't be replayed, and number of dives that lost data.
     pub fn failures(&self) -> (usize, usize) {
         let codes = self.table.column_by_name("exit_code");
         let codes = codes.and_then(|codes| codes.as_primitive_opt::<Int64Type>());

@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8, Error> {
     let threads = arguments.threads.map_or(cores, usize::from);
     let mut runtime = tokio::runtime::Builder::new_multi_thread();
     runtime.worker_threads(threads).enable_all();
-    // The scheduler traverses plans recursively.
+    // The stack is large, since the scheduler traverses plans recursively.
     #[cfg(feature = "cluster")]
     let runtime = runtime.thread_stack_size(32 << 20);
     let runtime = runtime.build();
@@ -161,7 +161,7 @@ async fn work(arguments: &Arguments, threads: usize) -> Result<u8, Error> {
     here(&campaign, arguments, sql.as_deref()).await
 }
 
-/// Runs on this machine.
+/// Replays the dives and answers the query from this machine.
 async fn here(campaign: &Campaign, arguments: &Arguments, sql: Option<&str>) -> Result<u8, Error> {
     let finished = make(campaign).await?;
     if let Some(sql) = sql {
@@ -181,7 +181,7 @@ async fn answer(
     let frame = session.sql(sql).await?;
     let schema = Arc::new(frame.schema().as_arrow().clone());
     let batches = frame.collect().await?;
-    // The schema of the batches, if any: it has string views, and which columns may be null.
+    // The batches' own schema is preferred, since it has string views and states which columns may be null.
     let schema = batches.first().map_or(schema, datafusion::arrow::array::RecordBatch::schema);
     if let Some(path) = &arguments.picture {
         let svg = picture::draw(sql, &schema, &batches)?;

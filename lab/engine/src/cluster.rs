@@ -1,6 +1,7 @@
 //! Runs replays and queries on many machines, with Ballista's scheduler, executors and client.
 //!
-//! Each has a codec for [`ReplayTable`] and [`ReplayExec`]. Ballista does the distribution, retries and collection.
+//! Scheduler, executors and client each have a codec for [`ReplayTable`] and [`ReplayExec`]. Ballista does the
+//! distribution, retries and collection.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -33,7 +34,7 @@ use crate::provider::{Asked, ReplayExec, ReplayTable, Replayed};
 
 /// Prefix of this program's nodes among those of Ballista.
 const OURS: &[u8] = b"headrace ";
-/// Time after which an executor without a heartbeat is lost, s. A busy executor sends one every 5 s.
+/// Time without a heartbeat after which an executor counts as lost, s. A busy executor sends a heartbeat every 5 s.
 const LOST_AFTER_S: u64 = 15;
 /// Interval at which the scheduler looks for lost executors, s.
 const LOOK_EVERY_S: u64 = 1;
@@ -42,7 +43,7 @@ const MESSAGE_BYTES: u32 = 256 << 20;
 
 /// Runs Ballista's scheduler until it ends.
 ///
-/// Errors: the address can't be listened on.
+/// Errors: the scheduler can't listen on the address.
 pub async fn schedule(address: SocketAddr, maker: Arc<Maker>) -> Result<(), Error> {
     let codec = Arc::new(Codec::new(maker));
     let config = SchedulerConfig {
@@ -66,10 +67,10 @@ pub async fn schedule(address: SocketAddr, maker: Arc<Maker>) -> Result<(), Erro
 
 /// Runs an executor until it is stopped.
 ///
-/// It runs `threads` tasks at a time for the scheduler at `host`:`port`, for which it waits. Others fetch results from
-/// `address`.
+/// The executor waits for the scheduler at `host`:`port`, and then runs `threads` tasks at a time for it. Other
+/// processes fetch results from `address`.
 ///
-/// Errors: the address can't be listened on, or the scheduler is gone.
+/// Errors: the executor can't listen on the address, or the scheduler has ended.
 pub async fn execute(
     (host, port): (&str, u16),
     address: SocketAddr,
@@ -84,7 +85,7 @@ pub async fn execute(
         port: address.port(),
         scheduler_host: host.to_owned(),
         scheduler_port: port,
-        // Any value except 0 makes it wait for the scheduler.
+        // Any value except 0 makes the executor wait for the scheduler.
         scheduler_connect_timeout_seconds: 60,
         vcores: threads,
         task_scheduling_policy: TaskSchedulingPolicy::PullStaged,
@@ -100,10 +101,10 @@ pub async fn execute(
 
 /// Creates a session whose plans are run by the executors of a scheduler.
 ///
-/// Errors: only those of the engine itself. A missing scheduler becomes an error of the first query.
+/// Errors: only those of the engine itself. If the scheduler is missing, the first query returns an error.
 pub fn session(scheduler: &str, maker: Arc<Maker>) -> Result<SessionContext, Error> {
     let config = SessionConfig::new_with_ballista()
-        // Dives take different times: a task of several dives would wait for the longest.
+        // Each task has one dive, since a task with several dives ends only with its longest replay.
         .set_usize(BALLISTA_SCHEDULER_MAX_PARTITIONS_PER_TASK, 1)
         .with_ballista_grpc_client_max_message_size(MESSAGE_BYTES as usize)
         .with_ballista_logical_extension_codec(Arc::new(Codec::new(maker)));
@@ -129,14 +130,16 @@ impl Codec {
     }
 }
 
-/// Appends one of this program's nodes, with the program's version.
+/// Appends a node of this program, preceded by the program's version.
 fn encode(what: &impl Serialize, bytes: &mut Vec<u8>) -> Result<()> {
     bytes.extend_from_slice(OURS);
     let with_version = (program_version(), what);
     serde_json::to_writer(bytes, &with_version).map_err(|error| DataFusionError::External(Box::new(error)))
 }
 
-/// Decodes one of this program's nodes, if it is one. A node of another version is an error.
+/// Decodes a node of this program; `None` for any other node.
+///
+/// Errors: the node is from another program version.
 fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<T>> {
     let Some(text) = bytes.strip_prefix(OURS) else { return Ok(None) };
     let external = |error| DataFusionError::External(Box::new(error));

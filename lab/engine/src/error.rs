@@ -1,4 +1,4 @@
-//! Errors that stop a campaign. A log that can't be replayed isn't one: it is a row of `dives`.
+//! Errors that stop a campaign. A log that can't be replayed does not stop it: the log becomes a row of `dives`.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ pub enum Error {
     /// Not a valid folder or URL.
     #[error("opening {place}: {why}")]
     Place {
-        /// As given.
+        /// Text of the invalid folder or URL.
         place: String,
         /// The reason.
         why: String,
@@ -22,7 +22,7 @@ pub enum Error {
     /// A store can't be listed or read.
     #[error("reading {what}: {source}")]
     Store {
-        /// The item read.
+        /// Folder or file that was listed or read.
         what: String,
         /// Error of the store.
         source: object_store::Error,
@@ -30,11 +30,11 @@ pub enum Error {
     /// A file can't be read or written.
     #[error("{doing} {}: {source}", path.display())]
     File {
-        /// `reading`, `writing`, ...
+        /// Attempted action: `reading`, `writing`, ...
         doing: &'static str,
         /// The file.
         path: PathBuf,
-        /// Cause.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// `dives.csv` of the folder is invalid.
@@ -56,7 +56,7 @@ pub enum Error {
     /// A Parquet file can't be written or read.
     #[error("{doing} {}: {source}", path.display())]
     Parquet {
-        /// `reading` or `writing`.
+        /// Attempted action: `reading` or `writing`.
         doing: &'static str,
         /// The file.
         path: PathBuf,
@@ -68,7 +68,7 @@ pub enum Error {
     Usage(String),
 }
 
-/// Turns an I/O error into one that names the file.
+/// Returns a function that turns an I/O error into one that names the file.
 pub(crate) fn of_file(doing: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Error {
     let path = path.to_owned();
     move |source| Error::File { doing, path, source }

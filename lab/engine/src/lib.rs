@@ -1,4 +1,4 @@
-//! Campaigns: the dives of a folder or bucket, replayed once each and queried in SQL.
+//! Campaigns: the dives of a folder or bucket. Each dive is replayed once, and SQL queries its tables.
 //!
 //! The manual is `docs/how-to/replay-many-dives.md`.
 

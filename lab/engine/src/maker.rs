@@ -1,4 +1,4 @@
-//! Makes a dive's tables: takes them from the cache, or replays the log and stores them.
+//! Makes a dive's tables: reads them from the cache, or replays the log and stores them.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -35,34 +35,34 @@ impl Counts {
         self.replayed.load(Ordering::Relaxed)
     }
 
-    /// Counts dives found in the cache after other processes replayed them.
+    /// Adds dives that another process replayed, and dives that were in the cache.
     pub fn add(&self, replayed: usize, cached: usize) {
         self.replayed.fetch_add(replayed as u64, Ordering::Relaxed);
         self.cached.fetch_add(cached as u64, Ordering::Relaxed);
     }
 
-    /// Dives that were taken from the cache.
+    /// Dives whose tables were in the cache.
     pub fn cached(&self) -> u64 {
         self.cached.load(Ordering::Relaxed)
     }
 
-    /// Dives that were broken in the cache and were made again.
+    /// Dives whose tables in the cache were broken and were made again.
     pub fn broken(&self) -> u64 {
         self.broken.load(Ordering::Relaxed)
     }
 }
 
-/// A dive's tables.
+/// Tables of a dive.
 #[derive(Debug, Clone)]
 pub enum Made {
-    /// In the cache.
+    /// The tables are in the cache.
     Kept {
         /// SHA-256 of the log.
         sha256: String,
-        /// Folder of its Parquet files.
+        /// Folder of the Parquet files.
         folder: PathBuf,
     },
-    /// No tables, since the log can't be read or replayed. The row of `dives` gives the reason.
+    /// There are no tables, since the log can't be read or replayed. The row of `dives` gives the reason.
     Unread(Arc<Tables>),
 }
 
@@ -72,12 +72,12 @@ impl Maker {
         Self { cache, threads: Arc::new(Semaphore::new(threads.max(1))), counts: Arc::default() }
     }
 
-    /// Its cache.
+    /// Cache of the maker.
     pub fn cache(&self) -> &Cache {
         &self.cache
     }
 
-    /// Counts of its work so far.
+    /// Counts of the maker's work so far.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
@@ -137,7 +137,7 @@ impl Maker {
         Ok(Made::Kept { sha256, folder })
     }
 
-    /// A dive's tables, if its log's digest is known and the cache has them.
+    /// Finds a dive's tables in the cache; `None` if the log's digest is unknown or the cache lacks the dive.
     ///
     /// Waits for a free thread. The dive isn't counted.
     ///
@@ -159,7 +159,7 @@ impl Maker {
         self.threads.acquire().await.map_err(|error| Error::Usage(error.to_string()))
     }
 
-    /// Finds a dive in the cache; removes a broken one.
+    /// Finds a dive in the cache. A broken dive is removed and counts as missing.
     async fn find(&self, sha256: String, parameters: &Parameters) -> Result<Option<Made>, Error> {
         let folder = self.cache.dive(&parameters.digest(), &sha256);
         let looked = folder.clone();
@@ -179,7 +179,7 @@ impl Maker {
 impl Made {
     /// Reads a table from the cache.
     ///
-    /// Errors: it can't be read.
+    /// Errors: the table can't be read.
     pub async fn table(&self, table: &'static str) -> Result<Vec<RecordBatch>, Error> {
         match self {
             Self::Unread(tables) => Ok(tables.get(table).cloned().into_iter().collect()),
@@ -198,9 +198,9 @@ impl Made {
     }
 }
 
-/// The tables of a dive that can't be read or replayed.
+/// Makes the tables of a dive that can't be read or replayed.
 ///
-/// Errors: its row can't be made.
+/// Errors: the row of `dives` can't be made.
 pub(crate) fn unread_dive(
     dive: &DiveLog,
     sha256: &str,
@@ -210,7 +210,7 @@ pub(crate) fn unread_dive(
     Ok(Made::Unread(Arc::new(unread(&dive.log, sha256, parameters, error)?)))
 }
 
-/// Runs long work on its own thread; a panic there becomes an error.
+/// Runs long work on a thread of its own. A panic of the work becomes an error.
 async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
     tokio::task::spawn_blocking(work)
         .await

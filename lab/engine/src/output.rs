@@ -20,7 +20,7 @@ pub const ENDINGS: [&str; 3] = ["csv", "json", "parquet"];
 
 /// Formats an answer as a text table.
 ///
-/// Errors: a value can't be shown.
+/// Errors: a value can't be formatted.
 pub fn pretty(answer: &[RecordBatch]) -> Result<String, Error> {
     let shown = pretty_format_batches(answer).map_err(DataFusionError::from)?;
     Ok(shown.to_string())
@@ -28,7 +28,7 @@ pub fn pretty(answer: &[RecordBatch]) -> Result<String, Error> {
 
 /// Checks that [`write`] supports a path's extension.
 ///
-/// Errors: it doesn't.
+/// Errors: the extension isn't supported.
 pub fn check(path: &Path) -> Result<(), Error> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().into_owned()).unwrap_or_default();
     if ENDINGS.contains(&ending.as_str()) {

@@ -19,7 +19,7 @@ use headrace_pictures::polyline::Frame;
 
 use crate::error::Error;
 
-/// Maximum number of rows that are drawn; the number of further rows is stated below.
+/// Maximum number of rows drawn. A line below states the number of further rows.
 const MOST_ROWS: usize = 60;
 /// Widest label, pixels.
 const LABEL_PX: f64 = 260.0;
@@ -32,7 +32,7 @@ const VERDICTS: [(&str, Colour); 4] = [
     ("open", Colour(170, 170, 170)),
 ];
 
-/// Draws an answer as the SQL's comment says.
+/// Draws an answer as specified by the SQL's comment.
 ///
 /// Errors: there is no such comment, it is invalid, or it names a column that doesn't exist.
 pub fn draw(sql: &str, schema: &SchemaRef, answer: &[RecordBatch]) -> Result<String, Error> {
@@ -57,7 +57,7 @@ pub fn draw(sql: &str, schema: &SchemaRef, answer: &[RecordBatch]) -> Result<Str
     }
 }
 
-/// An answer and the columns used for the drawing.
+/// An answer and the columns that the drawing uses.
 struct Answer<'a> {
     table: RecordBatch,
     keys: Vec<(&'a str, &'a str)>,
@@ -80,7 +80,7 @@ impl Answer<'_> {
         Ok(array.as_string::<i32>().iter().map(|text| text.unwrap_or("-").to_owned()).collect())
     }
 
-    /// Numbers of a column; null becomes NaN.
+    /// Values of a column as numbers; null becomes NaN.
     fn numbers(array: &ArrayRef) -> Result<Vec<f64>, Error> {
         let array = cast(array, &DataType::Float64).map_err(DataFusionError::from)?;
         let numbers = array.as_primitive::<Float64Type>();
@@ -90,14 +90,14 @@ impl Answer<'_> {
     }
 }
 
-/// A label shortened to fit.
+/// A label, shortened if it is wider than the margin.
 fn fitting(text: &str) -> String {
     let mut text = text.to_owned();
     while width_px(&text, NORMAL) > LABEL_PX && text.pop().is_some() {}
     text
 }
 
-/// Height of a row, pixels, and of the whole sheet.
+/// Height of a row and of the whole sheet, pixels.
 fn heights(rows: usize) -> (f64, u32) {
     let row_px = if rows > 30 { 15.0 } else { 22.0 };
     #[expect(clippy::cast_possible_truncation, reason = "at most some thousand pixels")]

@@ -21,37 +21,37 @@ const MOST_PARTS: u32 = 999;
 /// A folder of logs, on this machine or in an object store.
 #[derive(Debug, Clone)]
 pub struct Place {
-    /// Its URL, ending in `/`.
+    /// URL of the place, ending in `/`.
     url: Url,
     store: Arc<dyn ObjectStore>,
     prefix: StorePath,
-    /// The folder, if it is on this machine.
+    /// The folder, if the place is on this machine.
     folder: Option<PathBuf>,
 }
 
 /// A dive of a campaign: a log, or the parts of a recording in order.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DiveLog {
-    /// Path of the log below the place; for a recording in parts, that of the recording.
+    /// Path of the log below the place. A recording in parts has the path of the whole recording.
     pub log: String,
-    /// Its files.
+    /// Files of the dive, in order.
     pub parts: Vec<Part>,
 }
 
-/// A file of a dive, with attributes that change with its content.
+/// A file of a dive, with attributes that change if the content changes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Part {
-    /// Path below the place, as in its store.
+    /// Path below the place, as stored.
     pub path: String,
-    /// Its length.
+    /// Length of the file.
     pub bytes: u64,
     /// Time of the last modification, microseconds of UTC.
     pub modified_us: i64,
-    /// The store's own tag of its content.
+    /// The store's own tag of the content.
     pub e_tag: Option<String>,
 }
 
-/// The files of a dive on this machine. Dropping this removes copied files.
+/// Local files of a dive. Dropping this value removes copied files.
 pub struct Fetched {
     /// The files in order.
     pub files: Vec<PathBuf>,
@@ -94,14 +94,14 @@ impl Place {
         Ok(Self { url, store: Arc::from(store), prefix, folder })
     }
 
-    /// Its URL.
+    /// URL of the place.
     pub fn url(&self) -> &Url {
         &self.url
     }
 
-    /// Its dives, in the order of their paths.
+    /// Dives of the place, in the order of their paths.
     ///
-    /// Errors: it can't be listed.
+    /// Errors: the place can't be listed.
     pub async fn dives(&self) -> Result<Vec<DiveLog>, Error> {
         let failed = |source| Error::Store { what: self.url.to_string(), source };
         let mut parts: BTreeMap<String, Part> = BTreeMap::new();
@@ -119,9 +119,9 @@ impl Place {
         Ok(grouped(parts))
     }
 
-    /// A small text file below the place; `None` if it doesn't exist.
+    /// Reads a small text file below the place; `None` if there is no such file.
     ///
-    /// Errors: it can't be read.
+    /// Errors: the file can't be read.
     pub async fn text(&self, name: &str) -> Result<Option<String>, Error> {
         let what = format!("{}{name}", self.url);
         let failed = |source| Error::Store { what: what.clone(), source };
@@ -136,11 +136,11 @@ impl Place {
         text.map(Some).map_err(|_| Error::Place { place: what, why: "isn't UTF-8 text".to_owned() })
     }
 
-    /// Gets the files of a dive on this machine: the files themselves, or copies in a folder of `scratch`.
+    /// Returns the files of a dive on this machine: the original files, or copies in a folder of `scratch`.
     ///
     /// Copies last as long as the returned value.
     ///
-    /// Errors: they can't be read, or the copy can't be written.
+    /// Errors: the files can't be read, or a copy can't be written.
     pub async fn fetch(&self, dive: &DiveLog, scratch: &Path) -> Result<Fetched, Error> {
         if let Some(folder) = &self.folder {
             let files = dive.parts.iter().map(|part| folder.join(plain(&part.path)));
@@ -150,7 +150,7 @@ impl Place {
         let mut files = Vec::new();
         for (number, part) in dive.parts.iter().enumerate() {
             let failed = |source| Error::Store { what: format!("{}{}", self.url, part.path), source };
-            // The names of parts don't matter here, and paths of a store may not be valid on this machine.
+            // The copies have other names, since a path in the store may not be valid on this machine.
             let path = copy.path().join(format!("{number:03}.mcap"));
             let mut file = std::fs::File::create(&path).map_err(of_file("writing", &path))?;
             let location = self.location(&part.path).map_err(failed)?;
@@ -163,7 +163,7 @@ impl Place {
         Ok(Fetched { files, _copy: Some(copy) })
     }
 
-    /// Path in the store.
+    /// Path in the store of a path below the place.
     ///
     /// Errors: none for a listed path.
     fn location(&self, below: &str) -> Result<StorePath, object_store::Error> {
@@ -172,7 +172,7 @@ impl Place {
     }
 }
 
-/// A path as people write it; stores encode some characters.
+/// Decodes a path to readable text, since stores encode some characters.
 fn plain(path: &str) -> String {
     percent_decode_str(path).decode_utf8_lossy().into_owned()
 }
@@ -191,7 +191,7 @@ fn grouped(parts: BTreeMap<String, Part>) -> Vec<DiveLog> {
     dives.into_iter().map(dive).collect()
 }
 
-/// The recording that a file is a part of, and the part's number.
+/// The recording that a file belongs to, and the number of the part; `None` if the file is not a part.
 fn recording(path: &str) -> Option<(String, u32)> {
     let stem = path.strip_suffix(".mcap")?;
     let (_, digits) = stem.rsplit_once(|c: char| !c.is_ascii_digit())?;

@@ -1,4 +1,4 @@
-//! `replay` as a table of DataFusion: one log, one partition.
+//! The table `replay` of DataFusion: one partition per log.
 
 use std::fmt;
 use std::sync::Arc;
@@ -25,14 +25,14 @@ use serde::{Deserialize, Serialize};
 use crate::maker::Maker;
 use crate::place::{DiveLog, Place};
 
-/// The content of a replay table; can be sent to another process.
+/// Description of a replay table. It can be sent to another process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Replayed {
     /// URL of the place.
     pub place: String,
-    /// The dives, one for each partition.
+    /// The dives, one per partition.
     pub dives: Vec<DiveLog>,
-    /// Parameters of their replays.
+    /// Parameters of the replays.
     pub parameters: Parameters,
     /// Name of the table, one of [`TABLES`].
     pub table: String,
@@ -41,7 +41,7 @@ pub struct Replayed {
 impl Replayed {
     /// The table's name and schema.
     ///
-    /// Errors: there is no such table.
+    /// Errors: no table has this name.
     fn table(&self) -> Result<(&'static str, SchemaRef)> {
         let name = TABLES.into_iter().find(|table| *table == self.table);
         let Some(found) = name.and_then(|name| Some((name, schema(name)?))) else {
@@ -67,7 +67,7 @@ impl Replayed {
     }
 }
 
-/// A table whose dives are replayed, or taken from the cache, when it is read.
+/// A table of dives. Reading the table replays the dives, or takes them from the cache.
 #[derive(Debug)]
 pub struct ReplayTable {
     maker: Arc<Maker>,
@@ -76,15 +76,15 @@ pub struct ReplayTable {
 }
 
 impl ReplayTable {
-    /// Creates the table of these dives.
+    /// Creates the table of the described dives.
     ///
-    /// Errors: there is no such table.
+    /// Errors: no table has this name.
     pub fn new(maker: Arc<Maker>, replayed: Replayed) -> Result<Self> {
         let (_, schema) = replayed.table()?;
         Ok(Self { maker, replayed, schema })
     }
 
-    /// The content of the table.
+    /// Description of the table.
     pub fn replayed(&self) -> &Replayed {
         &self.replayed
     }
@@ -115,18 +115,18 @@ impl TableProvider for ReplayTable {
     }
 }
 
-/// The request for each dive that a plan lists; can be sent to another process.
+/// The request that applies to each dive of an input plan. It can be sent to another process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Asked {
-    /// Table and parameters. Its list of dives is empty, since the dives come from the input plan.
+    /// Table and parameters. The list of dives is empty, since the dives come from the input plan.
     pub replayed: Replayed,
     /// The requested columns; `None` means all.
     pub projection: Option<Vec<usize>>,
 }
 
-/// Replays the dives that its input plan lists, partition by partition.
+/// Replays the dives listed by its input plan, partition by partition.
 ///
-/// It has an input instead of being a leaf, because a distributing engine knows how to divide a list but nothing of
+/// The node has an input instead of being a leaf, because a distributing engine can divide a list but knows nothing of
 /// replays.
 #[derive(Debug)]
 pub struct ReplayExec {
@@ -138,9 +138,9 @@ pub struct ReplayExec {
 }
 
 impl ReplayExec {
-    /// Creates the node for the dives that `listed` has as JSON texts.
+    /// Creates the node for the dives that `listed` returns as JSON texts.
     ///
-    /// Errors: there is no such table or column.
+    /// Errors: the requested table or column doesn't exist.
     pub fn new(
         maker: Arc<Maker>,
         asked: impl Into<Arc<Asked>>,
@@ -186,7 +186,7 @@ impl ExecutionPlan for ReplayExec {
         vec![&self.listed]
     }
 
-    /// The list is already divided as required.
+    /// The list already has the required partitions.
     fn benefits_from_input_partitioning(&self) -> Vec<bool> {
         vec![false]
     }
@@ -220,7 +220,7 @@ impl ExecutionPlan for ReplayExec {
                 let batches = made.map_err(|error| external(error.into()))?.table(table).await;
                 let batches = batches.map_err(|error| external(error.into()))?.into_iter();
                 let wanted = batches.map(|batch| {
-                    // The tables of a copy contain the path of the replayed log.
+                    // If the log is a copy, its cached tables contain the path of the log that was replayed.
                     let batch = if table == "dives" { under_path(&batch, &dive.log)? } else { batch };
                     match &asked.projection {
                         None => Ok(batch),
@@ -241,7 +241,7 @@ fn listed_dives(batch: &RecordBatch) -> Vec<Result<DiveLog>> {
     parsed.map(|dive| dive.map_err(|error| external(error.into()))).collect()
 }
 
-/// Rows of `dives` with this path as their log.
+/// Rows of `dives`, with this path in the column `log`.
 fn under_path(batch: &RecordBatch, log: &str) -> Result<RecordBatch> {
     let columns =
         batch.schema_ref().fields().iter().zip(batch.columns()).map(|(field, column)| -> ArrayRef {
@@ -302,7 +302,7 @@ impl TableFunctionImpl for ReplayFunction {
     }
 }
 
-/// Overrides some parameters: a JSON object, or `key=value` separated by commas.
+/// Overrides some parameters by a text: a JSON object, or `key=value` pairs separated by commas.
 fn overridden(base: &Parameters, text: &str) -> Result<Parameters> {
     let external = |error: serde_json::Error| DataFusionError::Plan(format!("parameters {text:?}: {error}"));
     let mut all = serde_json::to_value(base).map_err(external)?;

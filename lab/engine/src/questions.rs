@@ -1,11 +1,11 @@
 //! Ready-made questions.
 
-/// A question: its name, and its SQL, whose first comments describe it.
+/// A question: a name and a SQL query, whose first comments describe the question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Question {
-    /// Its name.
+    /// Name of the question.
     pub name: &'static str,
-    /// Its SQL.
+    /// SQL of the question.
     pub sql: &'static str,
 }
 
@@ -24,7 +24,7 @@ impl Question {
         QUESTIONS.into_iter().find(|question| question.name == name)
     }
 
-    /// Its description: the first line of the SQL.
+    /// Description of the question: the first line of the SQL.
     pub fn about(&self) -> &'static str {
         self.sql.lines().next().unwrap_or_default().trim_start_matches("--").trim()
     }

@@ -45,7 +45,7 @@ fn stderr(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// The answer to SQL, and the last line of stderr.
+/// Runs SQL; returns the rows of the answer and the last line of stderr.
 fn ask(folder: &Path, cache: &Path, sql: &str, more: &[&str]) -> (Vec<Value>, String) {
     let answer = tempfile::Builder::new().suffix(".json").tempfile().unwrap();
     let output =
@@ -56,7 +56,7 @@ fn ask(folder: &Path, cache: &Path, sql: &str, more: &[&str]) -> (Vec<Value>, St
     (rows, stderr(&output).lines().last().unwrap_or_default().to_owned())
 }
 
-/// Every file of finished dives in a cache, by its path below the version.
+/// Content of every file of finished dives in a cache, by path below the version.
 fn files(cache: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     fn collect(folder: &Path, base: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) {
         for entry in std::fs::read_dir(folder).into_iter().flatten() {
@@ -74,7 +74,7 @@ fn files(cache: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// Finished dives in a cache.
+/// Number of finished dives in a cache.
 fn finished(cache: &Path) -> usize {
     files(cache).keys().filter(|path| path.ends_with("whole.json")).count()
 }
@@ -105,7 +105,7 @@ fn threads_shards_and_repeated_runs_give_the_same_tables() {
         }
     }
     assert!(union == all, "the shards aren't the whole");
-    // Shards merged together form a cache.
+    // The folders of all shards, merged into one folder, form a cache.
     let moved = cache("1-2").join(headrace_tables::program_version());
     let copied = Command::new("cp").arg("-r").arg(&moved).arg(cache("2-2")).status().unwrap();
     assert!(copied.success());
@@ -166,7 +166,7 @@ fn replay_is_a_table_function_with_parameters() {
 }
 
 #[test]
-fn a_log_that_cannot_be_read_is_a_row() {
+fn unreadable_log_becomes_a_row() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     std::fs::write(folder.path().join("no-log.mcap"), "this is no log").unwrap();
     let whole = std::fs::read(golden("stalls.mcap")).unwrap();
@@ -192,7 +192,7 @@ fn a_log_that_cannot_be_read_is_a_row() {
     assert_eq!(of("rosone/cut.mcap")["exit_code"], 3);
     assert!(of("rosone/cut.mcap")["losses"].as_i64().unwrap() > 0);
     assert_eq!(of("rosone/stalls.mcap")["exit_code"], 0);
-    // The table function also gives the path of a copy.
+    // The table function also returns the path of a copy.
     let (logs, _) =
         ask(folder.path(), cache.path(), "SELECT DISTINCT log FROM replay('*', '', 'dives')", &[]);
     assert_eq!(logs.len(), 8);
@@ -259,7 +259,7 @@ fn every_question_has_an_answer_and_a_picture() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let about = "log,plant,pilot,day\nceran/murk.mcap,Ceran,Ada,2020-05-01\nrosone/stalls.mcap,Ceran,Ben,2024-06-02\n";
     std::fs::write(folder.path().join("dives.csv"), about).unwrap();
-    // Imitates another program version that replayed the dives, one of them with another result.
+    // Imitates an earlier program version that replayed the same dives with the same results.
     run(folder.path(), cache.path(), &[]);
     let now = cache.path().join(headrace_tables::program_version());
     let before = cache.path().join("0.0.1+earlier");
@@ -289,7 +289,7 @@ fn every_question_has_an_answer_and_a_picture() {
     let years = &answers["years"];
     assert!(years.iter().any(|row| row["dived"] == "Ceran 2020-05-01"));
     assert!(years.iter().any(|row| row["dived"] == "Ceran 2024-06-02"));
-    // The same sections twice: nothing has changed.
+    // Both versions have the same sections, so nothing has changed.
     assert!(answers["versions"].iter().all(|row| {
         let both = row["change"].as_str().unwrap().split_once(" -> ").unwrap();
         both.0 == both.1 && row["d_moved_most_m"].as_f64().is_none_or(|moved_m| moved_m == 0.0)
@@ -301,7 +301,7 @@ fn every_question_has_an_answer_and_a_picture() {
 }
 
 #[test]
-fn invalid_requests_are_named() {
+fn invalid_requests_are_refused_with_a_reason() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let refused = |folder: &Path, arguments: &[&str], code: i32, why: &str| {
         let output = run(folder, cache.path(), arguments);

@@ -1,4 +1,4 @@
-//! A campaign whose replays are sent to a session of other processes.
+//! A campaign whose replays are sent to a session of other processes, which is lost.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by them")]
 
@@ -20,7 +20,7 @@ use headrace_campaign::maker::Maker;
 use headrace_campaign::place::Place;
 use headrace_tables::Parameters;
 
-/// Replays `at_each` dives at each of its first two plans, and then fails as lost.
+/// A session that fails at each of its first two plans, after `at_each` dives have been replayed.
 #[derive(Debug)]
 struct Lost {
     maker: Arc<Maker>,
@@ -47,9 +47,9 @@ impl QueryPlanner for Lost {
     }
 }
 
-/// Runs a campaign of five dives whose session is lost twice.
+/// Runs a campaign of five dives whose session may be lost twice.
 ///
-/// `at_each` dives are finished each time. Returns the number of plans sent, and the result.
+/// `at_each` dives are finished before each loss. Returns the number of plans sent, and the result.
 async fn sent(at_each: usize) -> (usize, std::result::Result<usize, String>) {
     let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     for log in ["adrift", "murk", "sectors", "stalls", "steel"] {

@@ -9,43 +9,43 @@ use crate::spacing::{Spacing, spacing};
 use crate::wilcoxon::{self, Options};
 use crate::{ExperimentError, Progress};
 
-/// Relative tolerance of T_x against the paper's experiment.
+/// Tolerance of T_x relative to the paper's experiment.
 const T_X_SHARE: f64 = 0.02;
-/// The same for the means of T_y and T.
+/// Tolerance of the mean T_y and the mean T relative to the paper's experiment.
 const MEAN_SHARE: f64 = 0.03;
 /// Length of a run, m, as in the paper.
 const LENGTH_M: f64 = 130.0;
-/// Effects of the paper's simulator: a sonar with 1 cm range noise, a pilot who drifts.
+/// Effects of the paper's simulator: a sonar with 1 cm of range noise, and a pilot who drifts.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n\
                        pilot_drift = { across_m = 0.5, up_m = 0.5, yaw_deg = 5 }\n";
 
-/// A run of Table 3 or 4, and of Table 5.
+/// A run in Table 3 or 4, with its T from Table 5.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunRow {
     /// The mode.
     pub mode: &'static str,
     /// Number of heads.
     pub heads: u8,
-    /// Whether they share the turn in sectors.
+    /// Whether the heads share the turn in sectors.
     pub sectors: bool,
     /// T_x, m.
     pub t_x: Pair,
     /// T_y: mean, standard deviation, least, largest, m.
     pub t_y: [Pair; 4],
-    /// T: mean, least, largest, m; Table 5 leaves out one head.
+    /// T: mean, least, largest, m; `None` for one head, which Table 5 leaves out.
     pub t: Option<[Pair; 3]>,
     /// The speed at which the paper's T_x was obtained, m/s.
     pub paper_speed_mps: f64,
-    /// Which of T_x, mean T_y and mean T miss their targets, and why.
+    /// The quantities that miss their targets (T_x, mean T_y, mean T), with reasons.
     pub misses: Vec<String>,
 }
 
 /// A figure of the paper and the recomputed one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pair {
-    /// As printed.
+    /// Figure printed in the paper.
     pub paper: f64,
-    /// Recomputed.
+    /// Recomputed figure.
     pub ours: f64,
 }
 
@@ -71,9 +71,9 @@ pub struct SignedRankRow {
     pub what: &'static str,
     /// Phase shift or sector offset.
     pub sectors: bool,
-    /// Two-sided p of predicted against the paper's experiments; `None` if all differences are zero.
+    /// Two-sided p of the predictions against the paper's experiments; `None` if all differences are zero.
     pub p_paper: Option<f64>,
-    /// Two-sided p of predicted against our experiments.
+    /// Two-sided p of the predictions against our experiments.
     pub p_ours: Option<f64>,
 }
 

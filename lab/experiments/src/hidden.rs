@@ -10,10 +10,10 @@ use crate::{ExperimentError, Progress};
 
 /// Length of a run, m.
 const LENGTH_M: f64 = 130.0;
-/// Lines evaluated around the perimeter.
+/// Number of lines around the perimeter on which passes are evaluated.
 const LINES: usize = 720;
 
-/// Effect of a layout with heads that occlude each other.
+/// Occlusion in a layout whose heads occlude each other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HiddenRow {
     /// Number of heads.
@@ -22,20 +22,21 @@ pub struct HiddenRow {
     pub side_by_side_deg: f64,
     /// Angle that a head loses to its neighbour, degrees.
     pub angle_deg: f64,
-    /// Wall occluded from it, m.
+    /// Length of wall occluded from that head, m.
     pub gap_m: f64,
     /// T_x / s without occlusion, m.
     pub t_x_m: f64,
     /// The largest distance between passes anywhere, as a multiple of `t_x_m`.
     pub times: f64,
-    /// The same for lines in the middle of the shadow: mean of each line's largest distance.
+    /// Mean, over the lines in shadow, of the line's largest distance between passes, as a multiple of `t_x_m`.
     pub times_in_shadow: f64,
 }
 
-/// The layouts: three heads; four with neighbours a quarter turn apart; four with neighbours half a turn apart.
+/// The layouts: three heads; four heads with neighbours a quarter turn apart, in two arrangements; four heads with
+/// neighbours half a turn apart.
 ///
-/// With a quarter turn, the occluded forward and aft heads follow each other on either wall at half a turn, or at a
-/// quarter turn.
+/// In the first arrangement of quarter turns, the occluded forward and aft heads follow each other on either wall after
+/// half a turn. In the second, they follow each other after a quarter turn.
 const ARRANGEMENTS: [(u8, &str); 4] = [(3, ""), (4, ""), (4, "[0, 0, -90, 90]"), (4, "[0, 90, 90, 0]")];
 
 /// Simulates all layouts in MEDIUM, as in Figure 13.
@@ -86,7 +87,8 @@ fn row(heads: u8, dive: &Dive) -> HiddenRow {
     }
 }
 
-/// The largest run of angles at which a head hits its neighbour, and the length of wall behind it.
+/// The largest range of consecutive angles at which a head hits its neighbour, and the length of wall behind the
+/// neighbour.
 fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     let (mut angle_rad, mut gap_m) = (0.0_f64, 0.0_f64);
     let mut began: Option<&Sample> = None;
@@ -94,7 +96,7 @@ fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     for sample in samples {
         if sample.of_wall {
             if let (Some(from), Some(before)) = (began, last) {
-                // Edges fall between two pings; the step beyond each is half occluded.
+                // A shadow's edge falls between two pings, so half of the step at each edge is occluded.
                 let turned = math::wrap_signed(before.angle_rad - from.angle_rad, TAU).abs() + dive.step_rad;
                 angle_rad = angle_rad.max(turned);
                 let around = math::wrap_signed(before.arc_m - from.arc_m, dive.profile.perimeter_m());
@@ -109,7 +111,7 @@ fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     (angle_rad, gap_m)
 }
 
-/// Phase between the last two heads, which are adjacent, in (0, pi].
+/// Phase between the last two heads, radians in (0, pi]. These heads are adjacent.
 fn side_by_side_rad(dive: &Dive) -> f64 {
     let firsts: Vec<f64> =
         dive.heads.iter().rev().take(2).filter_map(|samples| samples.first()).map(|s| s.angle_rad).collect();

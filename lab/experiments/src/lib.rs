@@ -1,11 +1,11 @@
-//! Recomputes the paper's tables (`paper`), and repeats its experiments of §8 and §9.
+//! Recomputes the paper's tables (`paper`), and repeats the paper's experiments of §8 and §9.
 //!
-//! Experiments are simulated dives with their spacings (Tables 3 to 5) and occlusion between heads. Further analyses
-//! are surfaces through samples and their distance from the wall (§8.2, 8.3), the perimeter as seen by a wide beam
-//! (§9.2), and the Wilcoxon signed-rank test (§8.1).
+//! Experiments are simulated dives. They give the spacings of Tables 3 to 5 and the occlusion between heads. Further
+//! analyses are surfaces through samples and their distance from the wall (§8.2, 8.3), the perimeter as seen by a wide
+//! beam (§9.2), and the Wilcoxon signed-rank test (§8.1).
 //!
-//! Results are deterministic: one thread, no clock, no randomness, no hash containers; mathematics through
-//! `headrace_geometry::math`.
+//! Results are deterministic. The code uses one thread, no clock, no randomness and no hash containers, and takes its
+//! mathematics from `headrace_geometry::math`.
 
 mod compared;
 pub mod drawings;
@@ -36,17 +36,17 @@ pub use meshes::MeshRow;
 pub use report::{Experiments, Finding, run};
 pub use stationary::Perimeter;
 
-/// Receives status messages.
+/// Function that receives status messages.
 pub type Progress<'a> = &'a dyn Fn(&str);
 
-/// An experiment can't be run.
+/// A reason why an experiment can't be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
     /// An invalid scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Invalid numbers of the paper.
+    /// Invalid numbers in a table of the paper.
     #[error(transparent)]
     Paper(#[from] PaperError),
     /// An invalid profile.
@@ -69,7 +69,7 @@ pub enum ExperimentError {
     Perimeter(#[from] perimeter::PerimeterError),
 }
 
-/// A whole number as an index; negative ones become zero.
+/// Converts a whole number to an index. Negative numbers become zero.
 fn index(k: i64) -> usize {
     usize::try_from(k).unwrap_or(0)
 }

@@ -13,11 +13,11 @@ use crate::{ExperimentError, Progress};
 
 /// Length of a run, m, as in the paper.
 pub(crate) const LENGTH_M: f64 = 130.0;
-/// The part of the surface compared, away from its ends.
+/// The compared part of the surface, away from its ends.
 const INNER: Stretch = Stretch { from_m: 20.0, to_m: 120.0, step_m: 0.1 };
-/// Noise of the paper's simulator.
+/// Range noise of the paper's simulator.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n";
-/// Repetitions of an unaligned dive, each with other phases.
+/// Number of repetitions of an unaligned dive, each with different phases.
 const SEEDS: u64 = 5;
 
 /// A configuration of §8.2 or §8.3.
@@ -25,26 +25,27 @@ const SEEDS: u64 = 5;
 pub struct MeshRow {
     /// Number of heads.
     pub heads: u8,
-    /// Their mode.
+    /// Mode of the heads.
     pub mode: &'static str,
-    /// Sector offset instead of phase shift.
+    /// Whether the heads are in sector offset instead of phase shift.
     pub sectors: bool,
-    /// Phases aligned.
+    /// Whether the phases are aligned.
     pub aligned: bool,
-    /// The paper's mean distance and standard deviation, m; `None` where not given.
+    /// Mean and standard deviation of the distance in the paper, m; `None` if the paper has none.
     pub paper_m: Option<[f64; 2]>,
-    /// From the wall to the screened Poisson surface of depth 8: mean, standard deviation, m; averaged over the seeds.
+    /// Distance from the wall to the screened Poisson surface of depth 8: mean and standard deviation, averaged over
+    /// the seeds, m.
     pub poisson_m: [f64; 2],
-    /// From the wall to the plain interpolation in (x, arc length), m.
+    /// Distance from the wall to the linear interpolation in (x, arc length): mean and standard deviation, m.
     pub plain_m: [f64; 2],
     /// Mean distance for each seed, m.
     pub seeds_m: Vec<f64>,
 }
 
-/// Heads, mode, sectors, aligned, and the paper's mean and standard deviation.
+/// Number of heads, mode, whether in sectors, whether aligned, and the paper's mean and standard deviation.
 type Configuration = (u8, &'static str, bool, bool, Option<[f64; 2]>);
 
-/// The paper's configurations and distances: heads, mode, sectors, aligned, mean and sd.
+/// The paper's configurations, with its distances.
 ///
 /// Source: errata, row "§8.2": the paper's text names one of the unaligned pairs twice.
 const PAPER: [Configuration; 10] = [
@@ -60,7 +61,7 @@ const PAPER: [Configuration; 10] = [
     (4, "medium", true, true, Some([0.020, 0.036])),
 ];
 
-/// Computes all configurations.
+/// Computes the distances of all configurations.
 ///
 /// Errors: no surface can be made; none with the built-in vehicles.
 pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<MeshRow>, ExperimentError> {
@@ -93,7 +94,7 @@ pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<MeshRow>, ExperimentErr
     Ok(rows)
 }
 
-/// The dive of a configuration: heads, mode, sectors, aligned.
+/// Settings of the dive of a configuration.
 ///
 /// Unaligned heads begin at a random angle of their turn or sweep.
 pub(crate) fn setting(
@@ -113,13 +114,13 @@ pub(crate) fn cloud(dive: &Dive) -> Vec<Xyz> {
     samples.map(|sample| [sample.at.x(), sample.at.y(), sample.at.z()]).collect()
 }
 
-/// The surface as the paper made it, and the bin size for an index of its triangles, m.
+/// The surface made as in the paper, and a bin size for an index of its triangles, m.
 pub(crate) fn poisson(dive: &Dive, cloud: &[Xyz]) -> Result<(Mesh, f64), ExperimentError> {
     let surface = Surface::through(&normals::towards_axis(&dive.profile, cloud), &Settings::of_paper())?;
     Ok((surface.mesh(), surface.cell_m() / 2.0))
 }
 
-/// Distances from the wall to the Poisson surface and to the plain interpolation.
+/// Distances from the wall to the Poisson surface, and to the linear interpolation.
 fn distances(dive: &Dive) -> Result<[Spread; 2], ExperimentError> {
     let cloud = cloud(dive);
     let (mesh, bin_m) = poisson(dive, &cloud)?;

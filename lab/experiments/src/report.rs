@@ -9,20 +9,20 @@ use crate::runs::SPEED_MPS;
 use crate::stationary::{self, Perimeter};
 use crate::{ExperimentError, Progress};
 
-/// Recomputed results beside the paper's.
+/// Recomputed results beside the paper's results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiments {
     /// Speed of the runs, m/s.
     pub speed_mps: f64,
     /// Tables 3 to 5.
     pub runs: Vec<RunRow>,
-    /// §8.1.
+    /// Signed-rank tests (§8.1).
     pub signed_ranks: Vec<SignedRankRow>,
-    /// §8.2 and §8.3.
+    /// Surfaces and their distance from the wall (§8.2, §8.3).
     pub meshes: Vec<MeshRow>,
-    /// §8.3.
+    /// Occlusion between heads (§8.3).
     pub hidden: Vec<HiddenRow>,
-    /// §9.2.
+    /// Perimeter from a stationary turn (§9.2).
     pub perimeter: Perimeter,
     /// The paper's findings, and whether they are confirmed.
     pub findings: Vec<Finding>,
@@ -39,7 +39,7 @@ pub struct Finding {
     pub evidence: String,
 }
 
-/// Runs all experiments; `progress` gets status messages.
+/// Runs all experiments; `progress` receives status messages.
 ///
 /// Errors: none with the built-in vehicles.
 pub fn run(progress: Progress<'_>) -> Result<Experiments, ExperimentError> {
@@ -96,7 +96,7 @@ fn findings(meshes: &[MeshRow], hidden: &[HiddenRow]) -> Vec<Finding> {
     findings
 }
 
-/// §8.3: distance between passes in places where neighbours occlude the wall.
+/// Finding of §8.3: the distance between passes where neighbouring heads occlude the wall.
 fn of_hidden(row: &HiddenRow) -> Finding {
     let twice = (1.9..2.15).contains(&row.times_in_shadow);
     let (says, holds) = match (row.heads, row.side_by_side_deg > 135.0) {

@@ -14,19 +14,19 @@ pub(crate) const SPEED_MPS: f64 = 0.197;
 /// Settings of a simulated dive.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Setting {
-    /// Number of heads: one is VITA 1, more are VITA 2.
+    /// Number of heads. One head means VITA 1, more heads mean VITA 2.
     pub heads: u8,
-    /// Their mode.
+    /// Mode of the heads.
     pub mode: &'static str,
-    /// Their layout.
+    /// Layout of the heads.
     pub layout: HeadLayout,
-    /// Whether heads at different positions along the hull are phased for the dive's speed.
+    /// Whether the heads' phases account for the dive's speed and the heads' positions along the hull.
     pub aligned: bool,
-    /// Whether neighbours occlude the wall from each other.
+    /// Whether neighbouring heads occlude the wall from each other.
     pub occlusion: bool,
     /// Distance travelled, m.
     pub length_m: f64,
-    /// Further lines of the scene's effects; SONARS is a placeholder for the ids of the heads.
+    /// Additional lines for the scene's effects; SONARS is a placeholder for the heads' ids.
     pub effects: String,
     /// Random seed.
     pub seed: u64,
@@ -37,7 +37,7 @@ pub(crate) struct Setting {
 pub(crate) struct Sample {
     /// Head number.
     pub head: u16,
-    /// Its angle in the sensor's frame, radians.
+    /// Angle of the head in the sensor's frame, radians.
     pub angle_rad: f64,
     /// Position of the head.
     pub from: Point3<Tunnel>,
@@ -53,7 +53,7 @@ pub(crate) struct Sample {
 pub(crate) struct Dive {
     /// The tunnel's profile.
     pub profile: Profile,
-    /// All pings with an echo, in time order, by head.
+    /// All pings with an echo, by head, in time order.
     pub heads: Vec<Vec<Sample>>,
     /// Angle between pings, radians.
     pub step_rad: f64,
@@ -129,7 +129,7 @@ fn scene_text(setting: &Setting) -> String {
     };
     let layout =
         HeadLayout::NAMES.iter().find(|(_, layout)| *layout == setting.layout).map_or("", |(name, _)| name);
-    // With a planned speed of zero, the phases ignore the heads' positions along the hull.
+    // With a planned speed of zero, the phases don't depend on the heads' positions along the hull.
     let planned_mps = if setting.aligned { SPEED_MPS } else { 0.0 };
     let layout = if setting.heads == 1 { String::new() } else { format!("heads.layout = \"{layout}\"\n") };
     let occlusion = if setting.occlusion { "occlusion = {}\n" } else { "" };

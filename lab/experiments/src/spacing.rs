@@ -7,19 +7,20 @@ use serde::Serialize;
 use crate::Spread;
 use crate::runs::{Dive, Sample};
 
-/// Lines along the wall on which passes are counted.
+/// Number of lines along the wall on which passes are counted.
 const LINES: usize = 72;
-/// Tolerance of a step's angle, as a share of the usual step.
+/// Tolerance of the angle of a regular step, as a share of the usual step.
 const STEP_SHARE: f64 = 0.25;
 
 /// The quantities of the paper's Tables 3 to 5 for a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Spacing {
-    /// Along the tunnel, from pass to pass: the mean over the lines along the wall.
+    /// T_x: mean distance along the tunnel from pass to pass.
     ///
-    /// In sectors, it is taken on lines at the sector ends and is twice the mean.
+    /// In phase shift, passes are counted on lines along the wall. In sectors, a pass is a turning point of a head at
+    /// the same end of its sector.
     pub t_x_m: f64,
-    /// Across it, from ping to ping in the cross-section.
+    /// T_y: distance across the tunnel from ping to ping, in the cross-section.
     pub t_y: Spread,
     /// T = sqrt(T_x^2 + T_y^2) for the mean, least and largest T_y.
     pub t_m: [f64; 3],
@@ -42,7 +43,7 @@ fn turned_rad(a: &Sample, b: &Sample) -> f64 {
     math::wrap_signed(b.angle_rad - a.angle_rad, TAU)
 }
 
-/// Distances in the cross-section between consecutive pings of a sweep.
+/// Distances in the cross-section between consecutive pings that are one regular step apart.
 fn steps_m(samples: &[Sample], step_rad: f64) -> impl Iterator<Item = f64> {
     samples.windows(2).filter_map(move |pair| {
         let [a, b] = pair else { return None };
@@ -52,10 +53,10 @@ fn steps_m(samples: &[Sample], step_rad: f64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// For each line along the wall, the chainages at which a head passed it, ascending.
+/// The chainages at which heads passed each line along the wall, ascending.
 pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
     let perimeter_m = dive.profile.perimeter_m();
-    // While only some of the heads have arrived, passes are farther apart.
+    // Only the stretch that all heads have passed counts, since passes of fewer heads are farther apart.
     let ends = |pick: fn(&[Sample]) -> Option<&Sample>| {
         dive.heads.iter().filter_map(move |samples| pick(samples)).map(|s| s.at.x())
     };
@@ -92,7 +93,7 @@ pub(crate) fn gaps_m(passes: &[f64]) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Advance in chainage between a head's turning points at the same end of its sector.
+/// Distances in chainage between a head's turning points at the same end of its sector.
 fn turning_gaps_m(samples: &[Sample]) -> Vec<f64> {
     let mut ends: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
     for triple in samples.windows(3) {

@@ -1,16 +1,16 @@
-//! Mean, standard deviation, least and largest of unsigned lengths.
+//! Mean, standard deviation, least and largest of absolute lengths.
 
 use headrace_geometry::math;
 use serde::Serialize;
 
-/// Statistics of unsigned lengths, m; all zero if there are none.
+/// Statistics of absolute lengths, m; all zero if there are no lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(crate) struct Spread {
     /// Count.
     pub count: usize,
     /// Mean, m.
     pub mean_m: f64,
-    /// Standard deviation of the population, m.
+    /// Population standard deviation, m.
     pub sd_m: f64,
     /// The least, m.
     pub min_m: f64,
@@ -23,7 +23,7 @@ impl Spread {
     pub(crate) fn of(lengths_m: impl IntoIterator<Item = f64>) -> Self {
         let (mut mean, mut squares) = (0.0, 0.0);
         let mut spread = Self { min_m: f64::INFINITY, ..Self::default() };
-        // Welford's updates: a sum of squares would lose the spread of nearly equal lengths.
+        // Welford's update is used, since a sum of squares would lose the spread of nearly equal lengths.
         for length in lengths_m.into_iter().map(f64::abs).filter(|length| length.is_finite()) {
             spread.count += 1;
             let step = length - mean;

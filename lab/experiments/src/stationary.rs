@@ -25,7 +25,7 @@ pub struct Perimeter {
     pub paper_m: f64,
     /// By the paper's method: the skeleton of the echo image, with steps of 1 or sqrt 2 pixels.
     pub skeleton_m: f64,
-    /// By the same skeleton, without the excess of the staircase.
+    /// By the same skeleton, corrected for the excess length of the pixel staircase.
     pub skeleton_smooth_m: f64,
     /// By a polygon through the first returns.
     pub first_returns_m: f64,
@@ -45,7 +45,7 @@ pub(crate) fn perimeter() -> Result<Perimeter, ExperimentError> {
         let (sin, cos) = math::sin_cos(angle_rad);
         profile.cast_from_inside(centre, [sin, -cos]).map_or(0.0, |hit| hit.range_m)
     };
-    // Rays are spread evenly over the beam's disc; those tilted ahead and astern have longer ranges to the same wall.
+    // Rays are spread evenly over the beam's disc. Rays tilted ahead or astern have longer ranges to the same wall.
     let golden_rad = PI * (3.0 - math::sqrt(5.0));
     let cone = |angle_rad: f64| -> Vec<f64> {
         let ray = |number: i32| {

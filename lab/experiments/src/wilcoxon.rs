@@ -2,8 +2,8 @@
 //!
 //! Differences are ranked by size, and ties share their mean rank. W+ is the sum of the ranks of positive differences.
 //! Zero differences are dropped before ranking (Wilcoxon), or ranked and then dropped (Pratt). Pratt's method preserves
-//! the effect of zeros on the other ranks. Without ties and zeros, and for up to 50 pairs, p is exact. Otherwise it is
-//! that of a normal distribution with the mean and variance of W+ given the ranks.
+//! the effect of zeros on the other ranks. Without ties and zeros, and for up to 50 pairs, p is exact. Otherwise p
+//! comes from a normal distribution that has W+'s mean and variance for the given ranks.
 //!
 //! Source: Wilcoxon 1945; Pratt 1959. The paper's §8.1 doesn't state its treatment of zeros.
 
@@ -15,10 +15,10 @@ pub(crate) const EXACT_MAX: usize = 50;
 /// Treatment of zero differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Zeros {
-    /// Dropped before ranking.
+    /// Zeros are dropped before ranking.
     #[default]
     Wilcoxon,
-    /// Ranked, then dropped.
+    /// Zeros are ranked, then dropped.
     Pratt,
 }
 
@@ -34,13 +34,13 @@ pub(crate) struct Options {
 /// Distribution used for p.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Method {
-    /// The distribution of W+ over all signs.
+    /// The exact distribution of W+ over all choices of signs.
     Exact,
     /// A normal distribution.
     Normal,
 }
 
-/// Result of the test. The p values are under the hypothesis that differences are symmetric about zero.
+/// Result of the test. The p values assume that the differences are symmetric about zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SignedRank {
     /// Sum of the ranks of positive differences.
@@ -51,17 +51,17 @@ pub(crate) struct SignedRank {
     pub used: usize,
     /// Number of zero differences.
     pub zeros: usize,
-    /// Probability of a W+ at least as far from its mean, on either side.
+    /// Probability that W+ is at least as far from its mean, on either side.
     pub p_two_sided: f64,
-    /// Probability of a W+ at least as large; small if differences tend to be positive.
+    /// Probability that W+ is at least as large; small if differences tend to be positive.
     pub p_greater: f64,
-    /// Probability of a W+ at most as large.
+    /// Probability that W+ is at most as large.
     pub p_less: f64,
     /// Distribution used.
     pub method: Method,
 }
 
-/// The test can't be made.
+/// A reason why the test can't be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum WilcoxonError {
@@ -76,7 +76,7 @@ pub(crate) enum WilcoxonError {
     /// A difference isn't a finite number.
     #[error("difference {index} isn't a number")]
     NotFinite {
-        /// Its index, from zero.
+        /// Index of the difference, from zero.
         index: usize,
     },
     /// All differences are zero, or there are none.
@@ -97,7 +97,8 @@ pub(crate) fn of_pairs(left: &[f64], right: &[f64], options: Options) -> Result<
 
 /// Tests differences.
 ///
-/// Sizes that are equal except for rounding aren't ties; round them first if they should be.
+/// Differences whose sizes are equal except for rounding errors aren't ties. Callers that need ties must round the
+/// differences first.
 ///
 /// Errors: see [`WilcoxonError`].
 pub(crate) fn of_differences(differences: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
@@ -135,14 +136,14 @@ fn ranks_of(sorted: &[f64]) -> Vec<f64> {
     let mut ranks = Vec::with_capacity(sorted.len());
     for tie in sorted.chunk_by(|a, b| a.abs() >= b.abs()) {
         let before = ranks.len();
-        // Mean of before + 1 to before + length.
+        // The shared rank is the mean of the ranks before + 1 to before + length.
         let rank = before as f64 + f64::midpoint(tie.len() as f64, 1.0);
         ranks.extend(tie.iter().map(|_| rank));
     }
     ranks
 }
 
-/// Two-sided, upper and lower p of W+ among all 2^n choices of signs.
+/// Two-sided, upper and lower p of W+, among all 2^n choices of signs.
 fn exact(n: usize, w_plus: f64) -> [f64; 3] {
     let counts = sign_choices(n);
     let total: f64 = counts.iter().sum();
@@ -165,7 +166,7 @@ fn sign_choices(n: usize) -> Vec<f64> {
     counts
 }
 
-/// The p values by the normal distribution. W+ is a sum of ranks, each included with even odds.
+/// The p values of a normal distribution. W+ is a sum of ranks, each included with probability one half.
 fn normal(ranks: impl Iterator<Item = f64>, w_plus: f64, continuity: bool) -> [f64; 3] {
     let (sum, squares) = ranks.fold((0.0, 0.0), |(sum, squares), rank| (sum + rank, squares + rank * rank));
     let (off, sd) = (w_plus - sum / 2.0, math::sqrt(squares / 4.0));

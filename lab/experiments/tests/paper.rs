@@ -1,4 +1,4 @@
-//! `headrace_experiments tables`: the paper's Tables 1 to 5 beside recomputed ones, as text and as JSON.
+//! `headrace_experiments tables`: the paper's Tables 1 to 5 beside recomputed numbers, as text and as JSON.
 
 #![allow(
     clippy::unwrap_used,
@@ -14,14 +14,14 @@ fn answer(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_headrace_experiments")).args(arguments).output().unwrap()
 }
 
-/// Output of the command; it must succeed.
+/// Runs the command, asserts success, and returns its output.
 fn shown(further: &[&str]) -> String {
     let Output { status, stdout, stderr } = answer(&[&["tables"], further].concat());
     assert_eq!((status.code(), stderr.as_slice()), (Some(0), &[][..]));
     String::from_utf8(stdout).unwrap()
 }
 
-/// All cells below `value`, with the path to each.
+/// Collects all cells below `value`, with the path to each cell.
 fn cells(path: &str, value: &Value, found: &mut Vec<(String, Value)>) {
     match value {
         Value::Object(map) if map.contains_key("printed") => found.push((path.to_owned(), value.clone())),
@@ -39,7 +39,7 @@ fn cells(path: &str, value: &Value, found: &mut Vec<(String, Value)>) {
     }
 }
 
-/// The text about the given tables; 0 is the text before the first.
+/// The output for the given tables. Number 0 is the text before the first table.
 fn said(tables: &[usize]) -> String {
     let shown = shown(&[]);
     let parts: Vec<&str> = shown.split("\n\n").collect();

@@ -1,7 +1,7 @@
 //! Arguments and results of Python functions: names of logs, and coordinates of many points as numpy arrays.
 //!
-//! Arrays cross as bytes, by numpy's own `tobytes` and `frombuffer`. That takes one copy and no extra crate, and types
-//! can't be confused. The buffer protocol isn't in Python's stable interface before 3.11.
+//! Arrays are passed as bytes, with numpy's own `tobytes` and `frombuffer`. This takes one copy and no extra crate, and
+//! types can't be confused. The buffer protocol isn't in Python's stable interface before 3.11.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use pyo3::{Borrowed, Bound, FromPyObject, PyAny, PyErr, PyResult, Python};
 
 use crate::errors::Failure;
 
-/// A log, the parts of a recording, or a folder of them.
+/// A log: one file, the parts of a recording, or a folder with these.
 #[derive(FromPyObject)]
 pub(crate) enum Named {
     One(PathBuf),
@@ -26,7 +26,7 @@ impl Named {
     }
 }
 
-/// Coordinates of points, m: an array of float64, or anything that numpy converts to one.
+/// Coordinates of points, m: an array of float64, or a value that numpy converts to such an array.
 pub(crate) struct Coordinates(Vec<f64>);
 
 impl<'py> FromPyObject<'_, 'py> for Coordinates {
@@ -48,7 +48,7 @@ impl<'py> FromPyObject<'_, 'py> for Coordinates {
     }
 }
 
-/// Numbers as an array of float64.
+/// Converts numbers to a numpy array of float64.
 pub(crate) fn array<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py, PyAny>> {
     let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
     py.import("numpy")?.call_method1("frombuffer", (PyByteArray::new(py, &bytes), "<f8"))
@@ -83,7 +83,7 @@ pub(crate) fn points(
 
 /// Returns `value` if it is finite and above zero.
 ///
-/// Errors: it isn't; `what` names it with its unit.
+/// Errors: any other value. `what` is the name in the error text.
 pub(crate) fn positive(what: &str, value: f64) -> Result<f64, Failure> {
     if value.is_finite() && value > 0.0 {
         Ok(value)

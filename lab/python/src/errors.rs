@@ -1,4 +1,4 @@
-//! Failures as the exceptions of `headrace._errors`, each with its file and the place in it.
+//! Failures, converted to the exceptions of `headrace._errors`. Each exception has the file and the place in the file.
 
 use std::io;
 use std::path::PathBuf;
@@ -19,10 +19,10 @@ mod python {
     pyo3::import_exception!(headrace._errors, SamplingError);
 }
 
-/// A failure of a call.
+/// A reason why a call fails.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
-    /// A log as a whole can't be read.
+    /// The log as a whole can't be read.
     #[error(transparent)]
     Log(#[from] LogError),
     /// The log doesn't have the requested source.
@@ -35,13 +35,13 @@ pub(crate) enum Failure {
         /// The sources in the log.
         known: String,
     },
-    /// A log without a vehicle file.
+    /// The log has no vehicle file.
     #[error("reading the vehicle file attached to {file}: none is attached, or it can't be read")]
     NoVehicleFile {
         /// The log.
         file: String,
     },
-    /// Invalid keys of a vehicle file.
+    /// The vehicle file has invalid keys.
     #[error(transparent)]
     Config(#[from] ConfigErrors),
     /// A file can't be read.
@@ -52,7 +52,7 @@ pub(crate) enum Failure {
         /// Cause.
         source: io::Error,
     },
-    /// Settings of a vehicle file are inconsistent.
+    /// The settings of the vehicle file are inconsistent.
     #[error("planning with {file}: {why}")]
     Vehicle {
         /// The vehicle file.
@@ -63,10 +63,10 @@ pub(crate) enum Failure {
     /// A dive can't be replayed.
     #[error(transparent)]
     Replay(headrace_tables::Error),
-    /// Sampling theory has no solution.
+    /// The formulas of the sampling theory have no solution.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
-    /// Dimensions don't give a profile.
+    /// The dimensions don't give a profile.
     #[error("making a tunnel's profile: {0}")]
     Profile(#[from] ProfileError),
     /// An argument is out of range.
@@ -74,7 +74,7 @@ pub(crate) enum Failure {
     Argument(String),
 }
 
-/// Errors of a log, a vehicle file or an argument keep their kind.
+/// Converts an error of making tables. Errors of the log, the vehicle file or an argument keep their kind.
 impl From<headrace_tables::Error> for Failure {
     fn from(error: headrace_tables::Error) -> Self {
         use headrace_tables::Error;
@@ -88,7 +88,7 @@ impl From<headrace_tables::Error> for Failure {
 }
 
 impl Failure {
-    /// A vehicle can't be simulated to compute its position errors.
+    /// Converts an error of computing position errors: the vehicle can't be simulated.
     pub(crate) fn of_scene(file: &str, error: SceneError) -> Self {
         match error {
             SceneError::Config(errors) => Self::Config(errors),
@@ -96,7 +96,7 @@ impl Failure {
         }
     }
 
-    /// The file, and the place in it.
+    /// The file that the failure concerns, and the place in the file.
     fn place(&self) -> (Option<String>, Option<String>) {
         match self {
             Self::Log(error) => place_in_log(error),
@@ -117,7 +117,7 @@ impl Failure {
     }
 }
 
-/// The log that an error concerns, and the byte.
+/// The log that an error concerns, and the byte in it.
 fn place_in_log(error: &LogError) -> (Option<String>, Option<String>) {
     match error {
         LogError::Open { path, .. } | LogError::NotAPart { path } => (Some(path.display().to_string()), None),

@@ -12,11 +12,11 @@ use crate::arguments::{Coordinates, points, positive};
 use crate::errors::Failure;
 use crate::table::Table;
 
-/// Edge of a cell of the store, m, as in a dive with a target of half a metre.
+/// Edge of a cell of the store, m. It equals that of a dive with a target of half a metre.
 const CELL_M: f64 = 0.25;
 /// Length of the stretch searched with one store, m.
 ///
-/// With the surroundings within the search radius it is short enough that the store packs no sample.
+/// Together with the search radius on either side, the stretch is so short that the store packs no sample.
 const STRETCH_M: f64 = 32.0;
 /// Maximum number of sections per call.
 const MAX_SECTIONS: f64 = 4e6;
@@ -24,12 +24,12 @@ const MAX_SECTIONS: f64 = 4e6;
 /// The largest hole of each section, for points on the unrolled wall.
 ///
 /// A hole's diameter is twice the largest distance from a place in the section to the nearest point. Arc lengths are
-/// cyclic in `perimeter_m`. Sections are [k L, (k + 1) L) with L = `section_m`, from the one with `from_m` to the one
-/// with `to_m`; these default to the points' first and last chainage.
+/// cyclic in `perimeter_m`. Sections are [k L, (k + 1) L) with L = `section_m`. The first section contains `from_m`,
+/// the last one `to_m`. These default to the points' first and last chainage.
 ///
-/// Columns: chainage_m and end_m of the section; d_m, the diameter D; d_least_m and d_most_m, bounds of D if the points
-/// are too dense to keep every one; d_bounded, false if a place has no point within 12 m: D is then at least d_m, and
-/// d_most_m is null; d_x_m and d_arc_m, the hole's centre.
+/// Columns: chainage_m and end_m are the start and end of the section. d_m is the diameter D. d_least_m and d_most_m
+/// are bounds of D, which differ if the points are too dense to keep every point. d_bounded is false if some place has
+/// no point within 12 m; D is then at least d_m, and d_most_m is null. d_x_m and d_arc_m are the hole's centre.
 ///
 /// Raises ValueError for lists of different lengths, a coordinate that isn't finite, no points without bounds, or more
 /// than 4,000,000 sections.
@@ -54,15 +54,15 @@ pub(crate) fn holes(
 
 /// A point cloud and the sections to search.
 struct Wall {
-    /// Chainage and arc length, in the order of chainage.
+    /// Chainage and arc length of each point, m, in the order of chainage.
     points: Vec<[f64; 2]>,
     perimeter_m: f64,
     section_m: f64,
-    /// The first section and the one after the last.
+    /// Number of the first section, and number after the last section.
     sections: [i64; 2],
 }
 
-/// A section's bounds and its hole.
+/// Start and end of a section, m, and its hole.
 type Found = (f64, f64, Hole);
 
 impl Wall {
@@ -112,7 +112,7 @@ impl Wall {
         section as f64 * self.section_m
     }
 
-    /// The points of a stretch, and those within the search radius of it.
+    /// A store of the points in a stretch, and of the points within the search radius of the stretch.
     fn store(&self, from_m: f64, to_m: f64) -> Result<SampleStore, Failure> {
         let (from_m, to_m) = (from_m - FARTHEST_M, to_m + FARTHEST_M);
         let first = self.points.partition_point(|point| point[0] < from_m);
@@ -130,7 +130,10 @@ impl Wall {
 }
 
 fn too_many(points: usize) -> Failure {
-    Failure::Argument(format!("{points} points within {STRETCH_M} m of tunnel; {} are possible", u32::MAX))
+    Failure::Argument(format!(
+        "{points} points within {STRETCH_M} m of tunnel; at most {} are possible",
+        u32::MAX
+    ))
 }
 
 fn not_stored(error: StoreError, points: usize) -> Failure {

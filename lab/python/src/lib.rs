@@ -1,8 +1,8 @@
 //! headrace as a Python package: reads logs, replays them as Arrow tables, and computes sampling theory and holes of
 //! point clouds.
 //!
-//! `python/headrace/_headrace.pyi` has the types for Python; a test compares it with this code. The interpreter's lock
-//! is released while a log is read or a wall searched.
+//! `python/headrace/_headrace.pyi` has the types for Python, and a test compares these types with this code. The
+//! interpreter's lock is released while a log is read or a wall is searched.
 
 mod arguments;
 mod errors;

@@ -19,9 +19,9 @@ use crate::vehicle;
 /// A source of a log: one sensor's stream of packets, or the operator's commands (`console`).
 #[pyclass(frozen, get_all, module = "headrace")]
 pub(crate) struct Source {
-    /// Its name.
+    /// Name of the source.
     id: String,
-    /// Kind of device; empty if unknown.
+    /// Kind of the device; empty if unknown.
     plugin: String,
     /// Connection of the device; empty if unknown.
     connect: String,
@@ -41,8 +41,8 @@ impl Source {
     }
 }
 
-/// A dive's log: an MCAP file, the parts of a recording, or a folder with these. Opening it scans it once, without
-/// unpacking.
+/// A dive's log: an MCAP file, the parts of a recording, or a folder with these. Opening a log scans it once, without
+/// unpacking its content.
 ///
 /// Raises LogError if a file can't be read, isn't MCAP, or has a later format, or if several files aren't parts of one
 /// recording. Damage isn't an error: see `losses`.
@@ -55,7 +55,7 @@ pub(crate) struct Log {
     found: OnceLock<Found>,
 }
 
-/// Facts about a log that has been read to its end.
+/// Content that is known only after the log has been read to its end.
 struct Found {
     losses: Vec<Loss>,
     notes: Vec<String>,
@@ -93,37 +93,37 @@ impl Log {
         })
     }
 
-    /// Its files, in reading order.
+    /// Files of the log, in reading order.
     #[getter]
     fn files(&self) -> Vec<PathBuf> {
         self.files.clone()
     }
 
-    /// First and last time, ns of the log's clock, from the chunks' headers; None without messages.
+    /// First and last time, ns of the log's clock, from the chunks' headers; None if the log has no messages.
     #[getter]
     fn span_ns(&self) -> Option<(u64, u64)> {
         self.span.map(|(from, to)| (from.0, to.0))
     }
 
-    /// Whether it has the ticks of the loop that wrote it, as logs of headrace do.
+    /// Whether the log has the ticks of the loop that wrote it. Logs of headrace have them.
     #[getter]
     fn has_ticks(&self) -> bool {
         self.has_ticks
     }
 
-    /// Metadata: entries of headrace's own record by key, of others by "record/key".
+    /// Metadata. Entries of headrace's own record are found by "key", entries of other records by "record/key".
     #[getter]
     fn metadata(&self) -> BTreeMap<String, String> {
         self.info.metadata.clone()
     }
 
-    /// The attached vehicle file, TOML; None if there is none that can be read.
+    /// The attached vehicle file, as TOML text; None if no readable vehicle file is attached.
     #[getter]
     fn vehicle_toml(&self) -> Option<&str> {
         self.info.vehicle_toml.as_deref()
     }
 
-    /// The other attachments by name.
+    /// The other attachments, by name.
     #[getter]
     fn attachments(&self, py: Python<'_>) -> BTreeMap<String, Py<PyBytes>> {
         let content = |(name, bytes): &(String, Vec<u8>)| (name.clone(), PyBytes::new(py, bytes).unbind());
@@ -132,14 +132,15 @@ impl Log {
 
     /// The tunnel's design profile from the attached vehicle file.
     ///
-    /// Raises LogError without a vehicle file, ConfigError if it is invalid.
+    /// Raises LogError if no vehicle file is attached, ConfigError if the vehicle file is invalid.
     fn profile(&self) -> Result<Profile, Failure> {
         let name = self.name();
         let vehicle = vehicle::attached(&self.info, &name)?;
         Ok(Profile::of(vehicle.tunnel.profile))
     }
 
-    /// Its sources, in order of their numbers. Reads the log to its end, once, since a log may define channels late.
+    /// Sources of the log, in order of their numbers. Reads the log to its end, once, since a log may define channels
+    /// late.
     ///
     /// Raises LogError on an I/O error.
     fn sources(&self, py: Python<'_>) -> Result<Vec<Source>, Failure> {
@@ -154,14 +155,14 @@ impl Log {
         Ok(self.found(py)?.losses.clone())
     }
 
-    /// Anomalies, and how they were handled; nothing was lost because of them. Reads the log to its end, once.
+    /// Anomalies that lost no data, and how the reader handled them. Reads the log to its end, once.
     ///
     /// Raises LogError on an I/O error.
     fn notes(&self, py: Python<'_>) -> Result<Vec<String>, Failure> {
         Ok(self.found(py)?.notes.clone())
     }
 
-    /// Its messages in reading order: those of all channels, or those from and to one source.
+    /// Messages of the log, in reading order: all messages, or only those from and to one source.
     ///
     /// Raises LogError on an I/O error or, at the end, if the log has no such source.
     #[pyo3(signature = (source=None))]
@@ -175,7 +176,7 @@ impl Log {
     }
 }
 
-/// Reads a log to its end.
+/// Reads a log to its end and collects its sources, losses and notes.
 fn read_all(files: &[PathBuf]) -> Result<Found, Failure> {
     let mut log = DiveLog::open(files)?;
     let mut doubles = log.doubles();

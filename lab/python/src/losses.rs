@@ -9,13 +9,13 @@ use pyo3::{pyclass, pymethods};
 pub(crate) struct Loss {
     /// Description of the loss and its place.
     what: String,
-    /// Start in its file, bytes; 0 if it has no place.
+    /// Start of the loss in its file, bytes; 0 if the loss has no place in a file.
     offset: u64,
-    /// Length in the file, bytes; 0 if it has no place.
+    /// Length of the loss in its file, bytes; 0 if the loss has no place in a file.
     bytes: u64,
-    /// The last time before it that is in the log, ns of the log's clock; None if there is none.
+    /// The last time in the log before the loss, ns of the log's clock; None if there is none.
     from_ns: Option<u64>,
-    /// The first time after it, ns of the log's clock; None if there is none.
+    /// The first time in the log after the loss, ns of the log's clock; None if there is none.
     to_ns: Option<u64>,
 }
 
@@ -30,7 +30,7 @@ impl Loss {
         }
     }
 
-    /// Messages that are out of order by more than a reader can hold.
+    /// The loss of messages that are too far out of order for the reader to sort.
     pub(crate) fn of_order(late: u64) -> Self {
         let what = format!("{late} messages too far out of order to be sorted, delivered in file order");
         Self { what, offset: 0, bytes: 0, from_ns: None, to_ns: None }

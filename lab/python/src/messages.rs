@@ -1,4 +1,4 @@
-//! The messages of a log, one after the other.
+//! The messages of a log, one after another.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -10,27 +10,27 @@ use pyo3::{Py, PyRef, Python, pyclass, pymethods};
 
 use crate::errors::Failure;
 
-/// Maximum number of messages that are read ahead without the interpreter's lock, and of their bytes.
+/// Maximum number of messages that are read ahead without the interpreter's lock, and maximum number of their bytes.
 const AHEAD: usize = 512;
 const AHEAD_BYTES: usize = 1 << 20;
 
 /// A message of a log.
 #[pyclass(frozen, get_all, module = "headrace")]
 pub(crate) struct Message {
-    /// "raw" (bytes from a source), "sent" (bytes sent to a source), "tick", "result", or "other" (a channel that
-    /// headrace doesn't define).
+    /// Kind of the message: "raw" (bytes from a source), "sent" (bytes sent to a source), "tick", "result", or "other"
+    /// (a channel that headrace doesn't define).
     kind: &'static str,
-    /// The source's name, for raw and sent messages.
+    /// The source's name; set for raw and sent messages.
     source: Option<String>,
-    /// The topic, for results.
+    /// The topic; set for results.
     topic: Option<String>,
     /// Time of receipt, ns of the log's clock.
     log_time_ns: u64,
     /// Time of validity, ns of the log's clock.
     publish_time_ns: u64,
-    /// Its number in its channel.
+    /// Number of the message in its channel.
     sequence: u32,
-    /// Its content.
+    /// Content of the message.
     data: Py<PyBytes>,
 }
 
@@ -49,7 +49,7 @@ impl Message {
 /// lock.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Messages {
-    /// Threads may share an iterator.
+    /// A lock allows threads to share an iterator.
     reading: Mutex<Reading>,
 }
 
@@ -84,7 +84,7 @@ impl Messages {
     }
 }
 
-/// A message as read.
+/// Converts a message as read from the log.
 struct Held {
     kind: &'static str,
     source: Option<String>,
@@ -97,7 +97,7 @@ struct Held {
 
 struct Reading {
     log: DiveLog,
-    /// The only source requested.
+    /// The requested source; `None` for all channels.
     source: Option<String>,
     ahead: VecDeque<Held>,
     ended: bool,
@@ -132,7 +132,8 @@ impl Reading {
         Ok(())
     }
 
-    /// Checks that the log has the requested source. All of its sources are known only at its end.
+    /// Checks that the log has the requested source. The check is at the log's end, since only then all sources are
+    /// known.
     fn check_source(&self) -> Result<(), Failure> {
         let sources = &self.log.header().sources;
         let Some(wanted) = &self.source else { return Ok(()) };

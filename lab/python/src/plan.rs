@@ -1,4 +1,4 @@
-//! Planning by a vehicle file, as `headrace plan` does.
+//! Plans by a vehicle file, as `headrace plan` does.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use pyo3::{Python, pyfunction};
 use crate::errors::Failure;
 use crate::vehicle;
 
-/// The answers of a plan as JSON; `headrace.sampling.plan` has it as dictionaries.
+/// The answers of a plan as JSON. `headrace.sampling.plan` returns them as dictionaries.
 #[pyfunction]
 #[pyo3(signature = (vehicle, *, target_m, speed_mps, time_s, drift_m, yaw_rad, yaw_rate_radps))]
 #[expect(

@@ -12,12 +12,13 @@ use crate::errors::Failure;
 use crate::spacing::Turn;
 use crate::vehicle;
 
-/// Soundings of a ring per step. They find the largest step wherever in the turn the pings fall.
+/// Number of soundings of a ring per step. With this number the largest step is found for any phase of the pings within
+/// the turn.
 const PER_STEP: u32 = 10;
 
 /// A tunnel's design profile: a closed cross-section in y (left) and z (up from the floor's centre), m.
 ///
-/// Arc length runs around it from the floor's centre via the left wall, crown and right wall.
+/// Arc length runs around the cross-section from the floor's centre via the left wall, crown and right wall.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Profile {
     profile: tunnel::Profile,
@@ -98,7 +99,7 @@ impl Profile {
         (y_m, z_m)
     }
 
-    /// Whether a point is inside.
+    /// Whether a point is inside the profile.
     fn contains(&self, y_m: f64, z_m: f64) -> bool {
         self.profile.contains([y_m, z_m])
     }
@@ -119,7 +120,8 @@ impl Profile {
         (y_m, z_m)
     }
 
-    /// Clock position of an arc length, looking along the tunnel: "6:00" is the floor's centre, "9:00" the left wall.
+    /// Clock position of an arc length, as seen looking along the tunnel: "6:00" is the floor's centre, "9:00" the left
+    /// wall.
     fn clock(&self, arc_m: f64) -> String {
         self.profile.clock(arc_m)
     }

@@ -15,10 +15,10 @@ use crate::errors::Failure;
 use crate::table::Table;
 use crate::vehicle;
 
-/// Interval of checks for Ctrl-C while a dive is replayed.
+/// Interval at which Ctrl-C is checked during a replay.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// The tables of one dive. docs/reference/dive-tables.csv describes their columns.
+/// The tables of one dive. docs/reference/dive-tables.csv describes the columns.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Tables {
     tables: headrace_tables::Tables,
@@ -26,7 +26,7 @@ pub(crate) struct Tables {
 
 #[pymethods]
 impl Tables {
-    /// The dive, one row: its facts and result.
+    /// The dive as one row: its facts and result.
     ///
     /// `losses`, `lost` and `exit_code` state what is missing from its log.
     #[getter]
@@ -116,7 +116,7 @@ pub(crate) fn replay(
                 Ok(replay_until(&files, &parameters, &stop).map_err(Failure::from)?)
             };
             threads.spawn(move || {
-                // Ignored: after an interrupt nobody waits for the result.
+                // A send error is ignored: after an interrupt, nobody waits for the result.
                 done.send(work()).ok();
             });
             loop {
@@ -128,7 +128,7 @@ pub(crate) fn replay(
                             return Err(interrupt);
                         }
                     }
-                    // The thread's panic continues when the scope ends.
+                    // A panic of the thread continues when the scope ends.
                     Err(RecvTimeoutError::Disconnected) => {
                         return Err(PyRuntimeError::new_err("replaying a dive: its thread ended early"));
                     }

@@ -5,7 +5,8 @@ use pyo3::{pyclass, pyfunction, pymethods};
 
 use crate::errors::Failure;
 
-/// Rotation of a head: equal steps, a ping at each, a whole number of steps to a turn (Jorge et al. 2021, Eq. 3).
+/// Rotation of a head in equal steps, with a ping at each step and a whole number of steps to a turn (Jorge et al.
+/// 2021, Eq. 3).
 ///
 /// Raises SamplingError for a step or period that isn't above zero, or a step that doesn't divide a turn.
 #[pyclass(frozen, eq, module = "headrace")]
@@ -51,7 +52,7 @@ impl Turn {
         self.turn.ping_period_s()
     }
 
-    /// omega: angle turned in a second, rad/s (Eq. 4).
+    /// omega: angle turned per second, rad/s (Eq. 4).
     #[getter]
     fn rate_radps(&self) -> f64 {
         self.turn.rate_radps()
@@ -64,8 +65,8 @@ impl Turn {
 
 /// The spiral of samples on the wall at a constant speed.
 ///
-/// `passes_per_turn` is the number of passes over a place in the time of one turn: 1 for a single head, s for s heads in phase
-/// shift, s / 2 for s heads in sectors.
+/// `passes_per_turn` is the number of passes over a place in the time of one turn. It is 1 for a single head, s for s
+/// heads in phase shift, and s / 2 for s heads in sectors.
 /// Raises SamplingError for a negative speed, or passes that aren't above zero.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Spiral {
@@ -107,12 +108,12 @@ impl Spiral {
         self.spiral.t_y_min_m(smallest_step_m)
     }
 
-    /// Mean step, m, from that of a head at rest, with the advance of one step.
+    /// Mean step, m, from the mean step of a head at rest and the advance during one step.
     fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
         self.spiral.t_y_mean_m(t_yp_m)
     }
 
-    /// Mean step, m, as Eq. 15 is printed: with the advance of a whole turn.
+    /// Mean step, m, as printed in Eq. 15: with the advance during a whole turn.
     fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
         self.spiral.t_y_mean_printed_m(t_yp_m)
     }
@@ -122,12 +123,12 @@ impl Spiral {
         self.spiral.t_max_m(t_y2_m)
     }
 
-    /// T_mean, m, from the mean step with the advance (Eq. 17).
+    /// T_mean, m, from the mean step including the advance (Eq. 17).
     fn t_mean_m(&self, t_y_mean_m: f64) -> f64 {
         self.spiral.t_mean_m(t_y_mean_m)
     }
 
-    /// T_min, m, from the smallest step with the advance (Eq. 18).
+    /// T_min, m, from the smallest step including the advance (Eq. 18).
     fn t_min_m(&self, t_y_min_m: f64) -> f64 {
         self.spiral.t_min_m(t_y_min_m)
     }
@@ -135,17 +136,18 @@ impl Spiral {
 
 /// T_max, m: the longer diagonal of four neighbouring samples (Jorge et al. 2021, Eq. 16).
 ///
-/// `t_x_m` is the distance between passes, `advance_m` that travelled between two pings, `t_y_m` the largest distance between
-/// neighbours within a turn.
+/// `t_x_m` is the distance between passes. `advance_m` is the distance travelled between two pings. `t_y_m` is the
+/// largest distance between neighbours within a turn.
 #[pyfunction]
 #[expect(clippy::similar_names, reason = "the paper's, and names of arguments")]
 pub(crate) fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     spacing::t_max_m(t_x_m, advance_m, t_y_m)
 }
 
-/// The speed at which T_max is the target, m/s; None where `t_y_m` alone reaches the target (Eq. 16 solved for v).
+/// The speed at which T_max equals the target, m/s; None if `t_y_m` alone reaches the target (Eq. 16 solved for v).
 ///
-/// `pass_gap_s` is the time between passes (T / s for s heads in phase shift), `ping_period_s` that between pings.
+/// `pass_gap_s` is the time between passes (T / s for s heads in phase shift). `ping_period_s` is the time between
+/// pings.
 #[pyfunction]
 pub(crate) fn speed_for_target_mps(
     target_m: f64,
@@ -156,7 +158,7 @@ pub(crate) fn speed_for_target_mps(
     spacing::speed_for_target_mps(target_m, t_y_m, pass_gap_s, ping_period_s)
 }
 
-/// T_y1, m: the step nearest to the perpendicular's foot on a flat wall, the smallest there (Eq. 5).
+/// T_y1, m: the smallest step on a flat wall, next to the foot of the perpendicular (Eq. 5).
 ///
 /// Raises SamplingError for an argument that isn't above zero, or a step of 90 degrees or more.
 #[pyfunction]
@@ -204,7 +206,7 @@ pub(crate) fn overlap(beam_rad: f64, step_rad: f64) -> Result<f64, Failure> {
     Ok(section::overlap(beam_rad, step_rad)?)
 }
 
-/// eta, m: range resolution of a head, its span of ranges by the number of counts (section 6).
+/// eta, m: range resolution of a head, its span of ranges divided by the number of counts (section 6).
 ///
 /// Raises SamplingError for no counts, a negative least range, or an empty span.
 #[pyfunction]

@@ -26,13 +26,13 @@ impl Table {
 
 #[pymethods]
 impl Table {
-    /// Names of its columns.
+    /// Names of the columns.
     #[getter]
     fn column_names(&self) -> Vec<String> {
         self.batch.schema_ref().fields().iter().map(|field| field.name().clone()).collect()
     }
 
-    /// The table as an Arrow stream, always in its own schema, whatever is requested.
+    /// The table as an Arrow stream. The stream always has the table's own schema, whatever schema is requested.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,
@@ -44,7 +44,7 @@ impl Table {
         PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(batches)), c"arrow_array_stream")
     }
 
-    /// Its schema.
+    /// Schema of the table.
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
         let schema = FFI_ArrowSchema::try_from(Arc::as_ref(self.batch.schema_ref()));
         let schema = schema.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;

@@ -11,13 +11,13 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::errors::Failure;
 
-/// Maximum number of bytes of a text file and of a data file that are read.
+/// Maximum size of a text file and of a data file, bytes.
 const TEXT_BYTES: u64 = 16 << 20;
 const DATA_BYTES: u64 = 256 << 20;
 
 /// Reads a vehicle file: its text, and the parsed vehicle.
 ///
-/// Errors: it can't be read; its keys are invalid.
+/// Errors: the file can't be read; its keys are invalid.
 pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let failed = |source| Failure::File { path: path.to_owned(), source };
     let text = regular_file::read_text(path, TEXT_BYTES).map_err(failed)?;
@@ -31,9 +31,9 @@ pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     Ok((text, vehicle))
 }
 
-/// The vehicle file attached to the log of that name.
+/// Reads the vehicle file attached to a log of that name.
 ///
-/// Errors: none is attached; its keys are invalid.
+/// Errors: no vehicle file is attached; its keys are invalid.
 pub(crate) fn attached(info: &LogInfo, log: &str) -> Result<VehicleConfig, Failure> {
     let text = info.vehicle_toml.as_deref().ok_or_else(|| Failure::NoVehicleFile { file: log.to_owned() })?;
     let load = |name: &str| {
@@ -45,7 +45,7 @@ pub(crate) fn attached(info: &LogInfo, log: &str) -> Result<VehicleConfig, Failu
     Ok(VehicleConfig::parse(Document::new(&format!("{log}/{VEHICLE_FILE}"), text), &KINDS, &load)?)
 }
 
-/// Loads files that the simulation of a vehicle file needs, from the vehicle file's folder.
+/// Returns a function that loads the files that a vehicle file's simulation needs, from the vehicle file's folder.
 pub(crate) fn bytes_beside(path: &Path) -> impl Fn(&str) -> Result<Vec<u8>, String> {
     let folder = folder_of(path);
     move |name| {

@@ -15,7 +15,7 @@ def golden() -> Path:
 
 @pytest.fixture(scope="session")
 def program() -> Path:
-    """The headrace program: HEADRACE_BIN, or as it was built last."""
+    """The headrace program: HEADRACE_BIN, or the latest build."""
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     places = [os.environ.get("HEADRACE_BIN"), target / "release" / "headrace", target / "debug" / "headrace"]
     found = [Path(place) for place in places if place and Path(place).is_file()]

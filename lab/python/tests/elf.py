@@ -1,4 +1,4 @@
-"""Checks that a wheel's library is for aarch64 and asks for nothing but the C library and Python: elf.py WHEEL"""
+"""Checks that a wheel's library is for aarch64 and depends only on the C library and Python: elf.py WHEEL"""
 
 import struct
 import sys
@@ -13,7 +13,7 @@ assert sys.argv[1].endswith("aarch64.whl"), sys.argv[1]
 assert library[:5] == b"\x7fELF\x02", "no 64-bit ELF file"
 kind, machine = struct.unpack_from("<HH", library, 16)
 assert (kind, machine) == (3, AARCH64), f"type {kind} of machine {machine}; a shared library (3) of {AARCH64} is wanted"
-# Sections, by the ELF header; of type 6 the dynamic one, of which entries of tag 1 are the libraries needed.
+# Sections, from the ELF header. The dynamic section has type 6; its entries with tag 1 are the required libraries.
 table, _, _, _, _, size, count, _ = struct.unpack_from("<QIHHHHHH", library, 40)
 sections = [struct.unpack_from("<IIQQQQIIQQ", library, table + number * size) for number in range(count)]
 [dynamic] = [section for section in sections if section[1] == 6]

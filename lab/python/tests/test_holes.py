@@ -1,4 +1,4 @@
-"""Holes of point clouds, held to the Voronoi diagrams of scipy."""
+"""Holes of point clouds, compared with the Voronoi diagrams of scipy."""
 
 import math
 
@@ -36,7 +36,7 @@ def largest_empty_circles(x_m, arc_m, perimeter_m, sections):
 
 
 @pytest.mark.parametrize("seed, count, section_m", [(1, 3000, 0.25), (2, 400, 0.5), (3, 12000, 1.0)])
-def test_holes_are_those_of_the_voronoi_diagram(seed, count, section_m):
+def test_holes_match_the_voronoi_diagram(seed, count, section_m):
     random = numpy.random.default_rng(seed)
     perimeter_m, length_m = 11.3, 70.0
     x_m, arc_m = random.uniform(-length_m / 2, length_m / 2, count), random.uniform(0, perimeter_m, count)
@@ -47,13 +47,13 @@ def test_holes_are_those_of_the_voronoi_diagram(seed, count, section_m):
     expected = numpy.array(list(largest_empty_circles(x_m, arc_m, perimeter_m, sections)))
     assert numpy.abs(holes.d_m - expected).max() < 1e-8
     assert (holes.d_least_m <= expected + 1e-8).all() and (expected <= holes.d_most_m + 1e-8).all()
-    # Its centre is where it says.
+    # The centre of the hole is at the stated position.
     images = numpy.concatenate([numpy.column_stack([x_m, arc_m + turn * perimeter_m]) for turn in (-1, 0, 1)])
     radii = cKDTree(images).query(numpy.column_stack([holes.d_x_m, holes.d_arc_m]))[0]
     assert numpy.abs(2 * radii - holes.d_m).max() < 1e-8
 
 
-def test_a_dense_cloud_is_within_its_bounds():
+def test_dense_cloud_is_within_its_bounds():
     random = numpy.random.default_rng(4)
     perimeter_m, count = 2.0, 20_000
     x_m, arc_m = random.uniform(0, 4.0, count), random.uniform(0, perimeter_m, count)
@@ -61,13 +61,13 @@ def test_a_dense_cloud_is_within_its_bounds():
     sections = list(zip(holes.chainage_m, holes.end_m))
     expected = numpy.array(list(largest_empty_circles(x_m, arc_m, perimeter_m, sections)))
     assert (holes.d_least_m <= expected + 1e-8).all() and (expected <= holes.d_most_m + 1e-8).all()
-    # Some points were left out, as others nearby stand for them.
+    # Thinning has dropped some points that have close neighbours.
     assert (holes.d_least_m < holes.d_m).any() and (holes.d_m < 0.2).all()
 
 
-def test_a_lattice_has_its_diagonal():
+def test_largest_hole_of_a_lattice_is_its_diagonal():
     x_m, arc_m = (grid.ravel() for grid in numpy.meshgrid(numpy.arange(20) * 0.5, numpy.arange(24) * 0.5))
-    # A view with strides, integers, and lists are taken as well.
+    # Views with strides, integers and lists are accepted too.
     both = numpy.column_stack([x_m, arc_m])
     holes = found(both[:, 0], both[:, 1], perimeter_m=12.0, from_m=2, to_m=5)
     assert holes.d_m.to_numpy() == pytest.approx(math.hypot(0.5, 0.5))
@@ -76,7 +76,7 @@ def test_a_lattice_has_its_diagonal():
     )
 
 
-def test_wall_without_points_is_not_bounded():
+def test_hole_in_a_wall_without_points_is_unbounded():
     holes = found([0.0], [0.0], perimeter_m=5.0, from_m=0.0, to_m=40.0)
     far = holes[holes.chainage_m > 13]
     assert not far.d_bounded.any() and far.d_most_m.isna().all() and (far.d_m == 24).all()
@@ -84,7 +84,7 @@ def test_wall_without_points_is_not_bounded():
     assert len(found([], [], perimeter_m=5.0, from_m=0.0, to_m=1.0)) == 5
 
 
-def test_arguments_out_of_range_are_named():
+def test_arguments_out_of_range_are_refused_by_name():
     with pytest.raises(ValueError, match="x_m has 1 values and arc_m has 2"):
         headrace.holes([1.0], [1.0, 2.0], perimeter_m=5.0)
     with pytest.raises(ValueError, match="point 1 has x_m NaN"):

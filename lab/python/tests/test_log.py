@@ -1,4 +1,4 @@
-"""Logs: what they hold, and what they lack."""
+"""Logs: messages, sources, attachments and losses."""
 
 import struct
 import subprocess
@@ -13,7 +13,7 @@ MAGIC = b"\x89MCAP0\r\n"
 
 
 def records(path: Path):
-    """Opcode and content of each record of an MCAP file, by its specification."""
+    """Opcode and content of each record of an MCAP file, following the MCAP specification."""
     data = path.read_bytes()
     assert data.startswith(MAGIC) and data.endswith(MAGIC)
     at = len(MAGIC)
@@ -24,13 +24,13 @@ def records(path: Path):
 
 
 def statistics(path: Path):
-    """Number of messages, first and last time by the log's own statistics record (opcode 0x0b)."""
+    """Number of messages, and first and last time, from the log's statistics record (opcode 0x0b)."""
     [content] = [content for _, opcode, content in records(path) if opcode == 0x0B]
     messages, _, _, _, _, _, first, last = struct.unpack_from("<QHIIIIQQ", content)
     return messages, first, last
 
 
-def test_a_log_has_the_messages_and_times_that_its_statistics_say(golden):
+def test_messages_and_times_match_the_statistics_in_the_log(golden):
     path = golden / "steel.mcap"
     log = headrace.Log(path)
     messages, first, last = statistics(path)
@@ -42,7 +42,7 @@ def test_a_log_has_the_messages_and_times_that_its_statistics_say(golden):
     assert [Path(file) for file in log.files] == [path]
 
 
-def test_sources_are_those_of_the_vehicle_file(golden):
+def test_sources_match_the_vehicle_file(golden):
     log = headrace.Log(str(golden / "steel.mcap"))
     ids = [source.id for source in log.sources()]
     assert len(set(ids)) == len(ids)
@@ -56,7 +56,7 @@ def test_sources_are_those_of_the_vehicle_file(golden):
     assert {m.kind for m in of_one} <= {"raw", "sent"} and of_one
 
 
-def test_a_recording_has_what_it_was_given_and_the_loops_ticks_and_results(program, golden, tmp_path):
+def test_recording_has_its_input_messages_ticks_and_results(program, golden, tmp_path):
     given = headrace.Log(golden / "steel.mcap")
     (tmp_path / "vehicle.toml").write_text(given.vehicle_toml)
     for name, content in given.attachments.items():
@@ -73,7 +73,7 @@ def test_a_recording_has_what_it_was_given_and_the_loops_ticks_and_results(progr
     assert "version" in recorded.metadata
 
 
-def test_damage_is_told_with_its_place(golden, tmp_path):
+def test_damage_is_reported_with_its_location(golden, tmp_path):
     whole = (golden / "steel.mcap").read_bytes()
     at, _, content = [record for record in records(golden / "steel.mcap") if record[1] == 0x06][5]
     broken = bytearray(whole)
@@ -90,7 +90,7 @@ def test_damage_is_told_with_its_place(golden, tmp_path):
     assert any("ends before" in loss.what for loss in headrace.Log(tmp_path / "cut.mcap").losses())
 
 
-def test_what_is_no_log_is_an_error_with_file_and_place(golden, tmp_path):
+def test_file_that_is_no_log_raises_an_error_with_file_and_location(golden, tmp_path):
     other = tmp_path / "other.mcap"
     other.write_bytes(b"no log at all")
     with pytest.raises(headrace.LogError, match="not an MCAP file") as caught:
@@ -105,7 +105,7 @@ def test_what_is_no_log_is_an_error_with_file_and_place(golden, tmp_path):
         headrace.Log(3)
 
 
-def test_a_log_is_read_from_several_threads(golden):
+def test_several_threads_read_one_log(golden):
     log = headrace.Log(golden / "steel.mcap")
     messages = log.messages()
     taken = [[], []]
@@ -122,7 +122,7 @@ def test_a_log_is_read_from_several_threads(golden):
     assert sorted((at, str(source), number) for at, source, number in taken[0] + taken[1]) == everything
 
 
-def test_the_profile_is_that_of_the_attached_vehicle_file(golden):
+def test_profile_matches_the_attached_vehicle_file(golden):
     profile = headrace.Log(golden / "steel.mcap").profile()
     assert profile.contains(*profile.reference_m)
     assert 5 < profile.perimeter_m < 100

@@ -1,4 +1,4 @@
-"""What is said of the package is there, and what is there is documented."""
+"""The package has all documented names, and documents all its names."""
 
 import importlib.metadata
 import inspect
@@ -22,11 +22,11 @@ def public():
 
 
 @pytest.mark.parametrize("name, thing", list(public()))
-def test_whatever_is_public_is_documented(name, thing):
+def test_public_names_are_documented(name, thing):
     assert len(inspect.getdoc(thing) or "") > 8, name
 
 
-def test_all_of_the_compiled_part_is_public():
+def test_all_names_of_the_compiled_module_are_public():
     from headrace import _headrace
 
     names = {name for name in vars(_headrace) if not name.startswith("_")}
@@ -34,7 +34,7 @@ def test_all_of_the_compiled_part_is_public():
     assert headrace.__version__ == importlib.metadata.version("headrace")
 
 
-def test_values_show_what_they_are(golden):
+def test_repr_describes_values(golden):
     log = headrace.Log(golden / "steel.mcap")
     assert "steel.mcap" in repr(log) and "1 files" in repr(log)
     assert repr(log.sources()[0]).startswith("Source(id=")
@@ -44,7 +44,7 @@ def test_values_show_what_they_are(golden):
     assert eval(repr(turn), {"Turn": sampling.Turn}) == turn != sampling.Turn(0.015707963267948967, 9.0)
 
 
-def test_the_base_of_exceptions_catches_each():
+def test_base_exception_catches_each_exception():
     for error in (headrace.LogError, headrace.ConfigError, headrace.ReplayError, headrace.SamplingError):
         assert issubclass(error, headrace.HeadraceError)
         told = error("why", "file", "byte 3")

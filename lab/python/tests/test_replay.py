@@ -1,4 +1,4 @@
-"""Replays, held to the reports of the program; tables, as three libraries take them."""
+"""Replays, compared with the program's reports, and tables in three libraries."""
 
 import json
 import re
@@ -15,7 +15,7 @@ import pytest
 import headrace
 
 TABLES = ["dives", "sections", "holes", "flags", "runs", "sources", "alerts"]
-#: Columns of sections, and where reports have them.
+#: Columns of sections, with their keys in reports.
 COLUMNS = {
     "chainage_m": ["start_m"],
     "end_m": ["end_m"],
@@ -71,7 +71,7 @@ def same_sections(tables, theirs):
 
 
 @pytest.mark.parametrize("name", ["too-fast", "steel", "murk", "adrift", "autopilot", "sectors", "slipping-cable"])
-def test_sections_are_those_of_the_golden_report(golden, name):
+def test_sections_match_the_golden_report(golden, name):
     tables = headrace.replay(golden / f"{name}.mcap")
     same_sections(tables, json.loads((golden / f"{name}.json").read_text()))
 
@@ -85,7 +85,7 @@ def test_sections_are_those_of_the_golden_report(golden, name):
         ({"smooth": True}, ["--smooth"]),
     ],
 )
-def test_a_replay_is_the_programs(program, golden, tmp_path, parameters, words):
+def test_replay_equals_that_of_the_program(program, golden, tmp_path, parameters, words):
     log = golden / "too-fast.mcap"
     theirs, code = report(program, tmp_path, log, *words)
     tables = headrace.replay(str(log), **parameters)
@@ -102,7 +102,7 @@ def test_a_replay_is_the_programs(program, golden, tmp_path, parameters, words):
     assert len(tables.flags) == len(flagged)
 
 
-def test_another_vehicle_file_and_parts(program, golden, tmp_path):
+def test_another_vehicle_file_and_recordings_in_parts_are_replayed(program, golden, tmp_path):
     log = headrace.Log(golden / "too-fast.mcap")
     vehicle = tmp_path / "vehicle.toml"
     vehicle.write_text(re.sub(r"(?m)^target_m = .*$", "target_m = 0.4", log.vehicle_toml))
@@ -112,7 +112,7 @@ def test_another_vehicle_file_and_parts(program, golden, tmp_path):
     assert theirs["target_m"] == 0.4
     same_sections(headrace.replay(log.files, vehicle=vehicle), theirs)
 
-    # A recording in parts is one dive, by its files and by its name.
+    # A recording in parts is one dive, whether given by its files or by its name.
     command = [program, "-q", "run", vehicle, "--source", golden / "too-fast.mcap", "--rotate", "20s", "--speed", "max"]
     subprocess.run([*command, "--record", tmp_path / "dive.mcap"], check=True)
     parts = sorted(tmp_path.glob("dive*.mcap"))
@@ -124,7 +124,7 @@ def test_another_vehicle_file_and_parts(program, golden, tmp_path):
     assert dive["losses"] == 1 and "part 2" in dive["lost"] and dive["exit_code"] == 3
 
 
-def test_a_loss_is_in_the_tables(program, golden, tmp_path):
+def test_loss_appears_in_the_tables(program, golden, tmp_path):
     cut = tmp_path / "cut.mcap"
     whole = (golden / "too-fast.mcap").read_bytes()
     cut.write_bytes(whole[: len(whole) // 2])
@@ -138,7 +138,7 @@ def test_a_loss_is_in_the_tables(program, golden, tmp_path):
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_pandas_polars_and_pyarrow_take_every_table(golden, name):
+def test_pandas_polars_and_pyarrow_accept_every_table(golden, name):
     table = getattr(headrace.replay(golden / "steel.mcap"), name)
     arrow = pyarrow.table(table)
     assert arrow.num_rows == len(table) and arrow.column_names == table.column_names
@@ -146,16 +146,16 @@ def test_pandas_polars_and_pyarrow_take_every_table(golden, name):
     frame = polars.DataFrame(table)
     assert frame.shape == arrow.shape and frame.columns == table.column_names
     assert frame.rows() == polars.from_arrow(arrow).rows()
-    # Before pandas 3 a table goes by way of pyarrow.
+    # Before version 3, pandas converts a table through pyarrow.
     of_pandas = pandas.DataFrame.from_arrow(table) if hasattr(pandas.DataFrame, "from_arrow") else arrow.to_pandas()
     assert list(of_pandas.columns) == table.column_names
-    # A capsule that nobody takes is released; one table gives any number of them.
+    # An unused capsule is released. A table gives any number of capsules.
     table.__arrow_c_stream__()
     assert pyarrow.table(table) == arrow
     assert f"{len(table)} rows" in repr(table)
 
 
-def test_errors_say_which_file_and_where(golden, tmp_path):
+def test_errors_state_the_file_and_the_location(golden, tmp_path):
     with pytest.raises(headrace.LogError) as caught:
         headrace.replay(tmp_path / "none.mcap")
     assert caught.value.file == str(tmp_path / "none.mcap")
@@ -176,7 +176,7 @@ def test_errors_say_which_file_and_where(golden, tmp_path):
     assert caught.value.file == str(golden / "too-fast.mcap")
 
 
-def test_other_threads_go_on_while_a_dive_is_replayed(golden):
+def test_other_threads_run_while_a_dive_is_replayed(golden):
     counted = []
     done = threading.Event()
 
@@ -196,7 +196,7 @@ def test_other_threads_go_on_while_a_dive_is_replayed(golden):
 
 
 def test_an_interrupt_ends_a_replay(golden):
-    # By processor time: an interrupted replay takes less than half of a whole one, however busy the machine is.
+    # Compares processor time, which does not depend on the load of the machine: an interrupted replay takes less than half the time.
     text = (
         "import os, resource, signal, sys, threading, headrace\n"
         "cpu_s = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_utime\n"

@@ -1,4 +1,4 @@
-"""Sampling theory: the paper's tables, values by hand, and the program's own plan."""
+"""Sampling theory, compared with the paper's tables, with values computed by hand and with the program's plan."""
 
 import csv
 import json
@@ -12,7 +12,7 @@ import headrace
 from headrace import Profile, sampling
 from headrace.sampling import Spiral, Turn
 
-#: Beside the repository where the paper's tables are kept.
+#: Folder of the paper's tables, next to the repository.
 PAPER = Path(__file__).resolve().parents[4] / "shared" / "paper"
 SPEED_MPS = 0.197
 
@@ -31,14 +31,14 @@ def modes():
     }
 
 
-def test_modes_are_those_of_the_papers_table_2():
+def test_modes_match_table_2_of_the_paper():
     for row in paper("table2-modes.csv"):
         turn = modes()[row["mode"]]
         assert turn.steps == int(row["samples_per_rev"])
         assert 1 / turn.ping_period_s == pytest.approx(float(row["samples_per_s"]), abs=0.01)
 
 
-def test_spacings_are_those_of_the_papers_table_4():
+def test_spacings_match_table_4_of_the_paper():
     perimeter_m = Profile.ceran_blueprint().perimeter_m
     assert perimeter_m == pytest.approx(34.17, abs=1e-9)
     compared = 0
@@ -46,10 +46,10 @@ def test_spacings_are_those_of_the_papers_table_4():
         turn, heads = modes()[row["mode"]], int(row["heads"])
         phase = Spiral(SPEED_MPS, turn, heads)
         sector = Spiral(SPEED_MPS, turn, heads / 2)
-        # Its baselines are of a speed that is up to 0.6 % off what it states.
+        # The paper's baselines belong to a speed that differs from the stated speed by up to 0.6 %.
         assert phase.t_x_m == pytest.approx(float(row["base_phase_tx"]), rel=0.007)
         assert sector.t_x_m == pytest.approx(float(row["base_sector_tx"]), rel=0.007)
-        # Rows of FAST with 3 and 4 heads repeat those of FASTER.
+        # In the paper, the rows of FAST with 3 and 4 heads repeat the rows of FASTER.
         if not (row["mode"] == "FAST" and heads > 2):
             mean_m = sampling.t_yp_m(perimeter_m, turn.steps)
             assert mean_m == pytest.approx(float(row["base_ty_mean"]), abs=0.0025)
@@ -57,7 +57,7 @@ def test_spacings_are_those_of_the_papers_table_4():
     assert compared == 13
 
 
-def test_combined_spacings_are_those_of_the_papers_table_5():
+def test_combined_spacings_match_table_5_of_the_paper():
     spacings = {(row["mode"], row["heads"]): row for row in paper("table4-multi-head.csv")}
     for row in paper("table5-combined.csv"):
         of = spacings[row["mode"], row["heads"]]
@@ -67,7 +67,7 @@ def test_combined_spacings_are_those_of_the_papers_table_5():
                 assert t_m == pytest.approx(float(row[f"{layout}_t_{size}"]), abs=0.0035), row
 
 
-def test_values_by_hand():
+def test_functions_match_values_computed_by_hand():
     fast = Turn(math.radians(0.9), 8.0)
     assert fast.steps == 400 and fast.rate_radps == pytest.approx(math.tau / 8)
     four = Spiral(SPEED_MPS, fast, 4.0)
@@ -92,14 +92,14 @@ def test_values_by_hand():
     assert sampling.footprint_m(3.0, 0.5, 2 * half) == pytest.approx(expected)
 
 
-def test_the_speed_for_a_target_meets_it():
+def test_speed_for_a_target_meets_the_target():
     turn = Turn(math.radians(0.9), 8.0)
     v_mps = sampling.speed_for_target_mps(0.5, 0.3, turn.period_s / 4, turn.ping_period_s)
     assert Spiral(v_mps, turn, 4.0).t_max_m(0.3) == pytest.approx(0.5)
     assert sampling.speed_for_target_mps(0.5, 0.5, 2.0, 0.02) is None
 
 
-def test_a_head_at_the_centre_of_a_circle_steps_evenly():
+def test_head_at_the_centre_of_a_circle_has_equal_steps():
     circle, turn = Profile.circle(3.0), Turn(math.radians(1.2), 6.6)
     y_m, z_m = circle.reference_m
     least_m, mean_m, most_m = circle.t_y_at_rest_m(y_m, z_m, turn)
@@ -111,7 +111,7 @@ def test_a_head_at_the_centre_of_a_circle_steps_evenly():
 
 def test_points_are_unrolled():
     circle = Profile.circle(2.0)
-    # Positive y is left, which arc length reaches first.
+    # Positive y is to the left, and arc length grows from the floor towards the left.
     arcs_m = circle.arc_m([0.0, 2.0, 0.0, -2.0], [0.0, 2.0, 4.0, 2.0])
     assert arcs_m.dtype == "float64"
     assert list(arcs_m) == pytest.approx([0.0, math.pi, math.tau, 1.5 * math.tau])
@@ -124,7 +124,7 @@ def test_points_are_unrolled():
     assert Profile.trimmed_circle(6.05, 10.4).perimeter_m == Profile.ceran().perimeter_m
 
 
-def test_arguments_out_of_range_are_named():
+def test_arguments_out_of_range_are_refused_by_name():
     with pytest.raises(headrace.SamplingError, match="doesn't divide a turn"):
         Turn(math.radians(0.7), 8.0)
     with pytest.raises(ValueError, match="speed in m/s is -1"):
@@ -141,7 +141,7 @@ def test_arguments_out_of_range_are_named():
     "asked",
     [{}, {"target_m": 0.4}, {"speed_mps": 0.15}, {"time_s": 7200.0}, {"drift_m": 0.2, "yaw_rad": math.radians(3)}],
 )
-def test_a_plan_is_the_programs(program, golden, asked):
+def test_plan_equals_that_of_the_program(program, golden, asked):
     vehicle = golden / "two-heads.toml"
     names = {"target_m": "--target", "speed_mps": "--speed", "drift_m": "--drift"}
     options = [word for key, name in names.items() if key in asked for word in (name, repr(asked[key]))]
@@ -160,7 +160,7 @@ def test_a_plan_is_the_programs(program, golden, asked):
     assert set(best["margins"]) == set(sampling.Margins.__annotations__)
 
 
-def test_a_wrong_vehicle_file_is_an_error_with_file_and_line(golden, tmp_path):
+def test_wrong_vehicle_file_raises_an_error_with_file_and_line(golden, tmp_path):
     text = (golden / "two-heads.toml").read_text()
     wrong = tmp_path / "wrong.toml"
     wrong.write_text(text.replace("target_m", "target_mm"))

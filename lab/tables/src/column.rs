@@ -1,6 +1,7 @@
-//! A table as a list of columns: the content of each, and how its value is taken from a row of the report.
+//! A table as a list of columns. Each column has a description, and a function that takes its value from a row of the
+//! report.
 //!
-//! The same list gives the schemas, the record batches and the page `docs/reference/dive-tables.csv`.
+//! The schemas, the record batches and the file `docs/reference/dive-tables.csv` are made from the same list.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -16,13 +17,13 @@ use crate::Error;
 pub(crate) const DIVE: &str = "dive";
 const DIVE_ABOUT: &str = "The dive: first 16 digits of its log's SHA-256; the key between tables";
 
-/// Takes a column's value from a row; `None` is null.
+/// Function that takes a column's value from a row; `None` is null.
 pub(crate) enum Get<R> {
     Text(fn(&R) -> Option<String>),
     Number(fn(&R) -> Option<f64>),
     Count(fn(&R) -> Option<i64>),
     Truth(fn(&R) -> Option<bool>),
-    /// Microseconds of UTC.
+    /// Time in microseconds of UTC.
     Moment(fn(&R) -> Option<i64>),
 }
 
@@ -50,10 +51,10 @@ impl<R> Get<R> {
     }
 }
 
-/// A column: its name with the unit, its description, and how to take its value.
+/// A column: its name with the unit, its description, and the function that takes its value.
 pub(crate) struct Column<R>(pub(crate) &'static str, pub(crate) &'static str, pub(crate) Get<R>);
 
-/// A table of rows `R`.
+/// A table with rows of type `R`.
 pub(crate) struct Table<R> {
     pub(crate) name: &'static str,
     /// Description of a row.
@@ -76,7 +77,7 @@ impl<R> Table<R> {
             .map_err(|source| Error::Table { table: self.name, source })
     }
 
-    /// Formats the table as a section of Markdown.
+    /// Appends the table's description as rows of CSV.
     pub(crate) fn describe(&self, page: &mut String) {
         let mut row = |name: &str, kind: &str, about: &str| {
             // Writing to a string can't fail.
@@ -98,7 +99,7 @@ impl<R> Table<R> {
     }
 }
 
-/// A count as Arrow's widest signed integer, which SQL sums without surprises.
+/// Converts a count to Arrow's widest signed integer, which SQL sums without surprises.
 #[expect(clippy::unnecessary_wraps, reason = "as columns want it")]
 pub(crate) fn count(value: impl TryInto<i64>) -> Option<i64> {
     Some(value.try_into().unwrap_or(i64::MAX))

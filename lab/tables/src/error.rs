@@ -9,7 +9,7 @@ use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::smooth::SmoothError;
 
-/// A dive's tables can't be made.
+/// A reason why a dive's tables can't be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -18,7 +18,7 @@ pub enum Error {
     Parameter {
         /// The parameter.
         name: &'static str,
-        /// Its value.
+        /// Value of the parameter.
         value: f64,
         /// Least value allowed.
         from: f64,
@@ -39,7 +39,7 @@ pub enum Error {
     /// The log can't be opened or read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The log has no vehicle file, and none was given.
+    /// The log has no vehicle file, and the parameters have none.
     #[error("reading {}: no vehicle file {}; give one as the parameter vehicle", log.display(), match loss {
         Some(loss) => format!("can be read from this damaged log ({loss})"),
         None => "is attached to this log".to_owned(),
@@ -47,7 +47,7 @@ pub enum Error {
     NoVehicle {
         /// The log.
         log: PathBuf,
-        /// The first of its losses.
+        /// The first of the log's losses.
         loss: Option<String>,
     },
     /// The vehicle file is invalid.

@@ -1,4 +1,4 @@
-//! The device kinds that a vehicle file may name. A test checks that they equal those of the `headrace` command.
+//! The device kinds that a vehicle file may name. A test checks that this list equals the `headrace` command's list.
 
 use headrace_sensor::device::DeviceKind;
 
@@ -15,9 +15,9 @@ pub const KINDS: [&dyn DeviceKind; 7] = [
 
 #[cfg(test)]
 mod tests {
-    /// The lists can't be shared: the command's crate would add its terminal, page and ports as dependencies.
+    /// The two lists can't be shared: the command's crate would add its terminal, page and ports as dependencies.
     #[test]
-    fn list_equals_that_of_the_command() {
+    fn device_kinds_equal_those_of_the_command() {
         let lines = |text: &str| -> Vec<String> {
             let kinds = text.lines().map(str::trim).filter(|line| line.starts_with("&headrace_"));
             kinds.map(str::to_owned).collect()

@@ -9,7 +9,8 @@
 //! # Ok::<(), headrace_tables::Error>(())
 //! ```
 //!
-//! `docs/reference/dive-tables.csv` describes the tables. The same log with the same parameters gives the same tables, bit for bit, on any machine.
+//! `docs/reference/dive-tables.csv` describes the tables. The same log with the same parameters gives the same tables,
+//! bit for bit, on any machine.
 
 mod column;
 mod error;
@@ -48,7 +49,7 @@ pub fn program_version() -> &'static str {
 /// The tables of one dive, each with the schema of [`schema`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tables {
-    /// One row.
+    /// The dive, as one row.
     pub dives: RecordBatch,
     /// A row for each section of the coverage extent.
     pub sections: RecordBatch,
@@ -65,7 +66,7 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// The table with a name of [`TABLES`].
+    /// Finds a table by a name of [`TABLES`].
     pub fn get(&self, name: &str) -> Option<&RecordBatch> {
         Some(match name {
             "dives" => &self.dives,
@@ -80,7 +81,7 @@ impl Tables {
     }
 }
 
-/// Schema of the table with a name of [`TABLES`].
+/// Schema of a table, found by a name of [`TABLES`].
 pub fn schema(name: &str) -> Option<SchemaRef> {
     Some(match name {
         "dives" => dives().schema(),
@@ -111,7 +112,7 @@ pub fn replay(log: &[PathBuf], parameters: &Parameters) -> Result<Tables, Error>
     replay_digested(log, &first, &log_digest(log)?, parameters)
 }
 
-/// Replays a dive like [`replay`], until another thread sets `stop`.
+/// Replays a dive like [`replay`], but stops early if another thread sets `stop`.
 ///
 /// Errors: see [`replay`]; [`Error::Stopped`].
 pub fn replay_until(log: &[PathBuf], parameters: &Parameters, stop: &AtomicBool) -> Result<Tables, Error> {
@@ -119,7 +120,7 @@ pub fn replay_until(log: &[PathBuf], parameters: &Parameters, stop: &AtomicBool)
     tables_of(log, &first, &log_digest(log)?, parameters, stop)
 }
 
-/// Replays a log whose [`log_digest`] is known, under another name in `dives.log`.
+/// Replays a log whose [`log_digest`] is already known. `dives.log` gets the given name.
 ///
 /// Errors: see [`replay`].
 pub fn replay_digested(
@@ -158,11 +159,11 @@ fn tables_of(
     })
 }
 
-/// The tables of a log that couldn't be replayed: only a row of `dives` with the error.
+/// The tables of a log that couldn't be replayed. They contain only a row of `dives`, with the error.
 ///
-/// `sha256` is the log's [`log_digest`], empty if that can't be computed; `log` is its path.
+/// `sha256` is the log's [`log_digest`], or empty if the digest can't be computed. `log` is the log's path.
 ///
-/// Errors: [`Error::Table`], which the caller can't cause.
+/// Errors: [`Error::Table`], which is a defect of this library.
 pub fn unread(log: &str, sha256: &str, parameters: &Parameters, error: &str) -> Result<Tables, Error> {
     let row =
         Row { log, sha256, parameters: &parameters.digest(), version: program_version(), dive: Err(error) };
@@ -177,7 +178,8 @@ pub fn unread(log: &str, sha256: &str, parameters: &Parameters, error: &str) -> 
     })
 }
 
-/// The tables and their columns as CSV, for `docs/reference/dive-tables.csv`. A row without a column describes the table.
+/// The tables and their columns as CSV, for `docs/reference/dive-tables.csv`. A row without a column name describes the
+/// table.
 pub fn described() -> String {
     let mut page = "table,column,type,description\n".to_owned();
     macro_rules! describe {
@@ -187,7 +189,7 @@ pub fn described() -> String {
     page
 }
 
-/// The first bytes as hexadecimal digits.
+/// Formats the first bytes as hexadecimal digits.
 #[expect(clippy::format_collect, reason = "a few bytes")]
 fn hex(bytes: &[u8], most: usize) -> String {
     bytes.iter().take(most).map(|byte| format!("{byte:02x}")).collect()

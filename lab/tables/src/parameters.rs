@@ -16,7 +16,7 @@ const SECTION_M: RangeInclusive<f64> = 0.05..=10.0;
 /// Allowed speeds of sound, m/s.
 const SOUND_SPEED_MPS: RangeInclusive<f64> = 1300.0..=1700.0;
 
-/// Parameters of a replay; each defaults to the setting of the vehicle file attached to the log.
+/// Parameters of a replay. Each one defaults to the setting of the vehicle file attached to the log.
 ///
 /// The length of a tick isn't a parameter, since no result depends on it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -30,14 +30,14 @@ pub struct Parameters {
     pub sound_speed_mps: Option<f64>,
     /// Text of a vehicle file that replaces the log's.
     pub vehicle: Option<String>,
-    /// Text of the files that `vehicle` names, by name. Files not listed here are taken from the log.
+    /// Text of the files that `vehicle` names, by name. Other files are taken from the log.
     pub vehicle_files: BTreeMap<String, String>,
     /// Judge along the smoothed trajectory.
     pub smooth: bool,
 }
 
 impl Parameters {
-    /// Digest of all parameters, 16 hexadecimal digits; the same in any process and on any machine.
+    /// Digest of all parameters, as 16 hexadecimal digits. It is the same in any process and on any machine.
     pub fn digest(&self) -> String {
         let mut hasher = Sha256::new();
         let mut put = |bytes: &[u8]| {
@@ -57,9 +57,9 @@ impl Parameters {
         crate::hex(&hasher.finalize(), 8)
     }
 
-    /// Overrides a vehicle file's settings.
+    /// Changes a vehicle's settings to the parameters.
     ///
-    /// Errors: a value out of its range.
+    /// Errors: a value is out of its range.
     pub(crate) fn apply(&self, vehicle: &mut VehicleConfig) -> Result<(), Error> {
         if let Some(target_m) = within("target_m", self.target_m, TARGET_M)? {
             vehicle.target_m = target_m;
@@ -73,9 +73,9 @@ impl Parameters {
         Ok(())
     }
 
-    /// Checks that every value is in its range, for callers that need to know before the first log.
+    /// Checks that every value is in its range. Campaigns call this before they open the first log.
     ///
-    /// Errors: a value out of its range.
+    /// Errors: a value is out of its range.
     pub fn check(&self) -> Result<(), Error> {
         within("target_m", self.target_m, TARGET_M)?;
         within("section_m", self.section_m, SECTION_M)?;

@@ -20,7 +20,7 @@ use crate::kinds::KINDS;
 use crate::stoppable::Stoppable;
 use crate::{Error, Parameters};
 
-/// Longest vehicle file, or file named by it, bytes.
+/// Maximum size of a vehicle file, or of a file that it names, bytes.
 const TEXT_BYTES: u64 = 16 << 20;
 
 /// A replayed dive.
@@ -30,14 +30,14 @@ pub(crate) struct Dive {
     pub(crate) about: About,
 }
 
-/// Facts that a log states about itself.
+/// Facts that the log states about itself.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct About {
-    /// The program that wrote it.
+    /// The program that wrote the log.
     pub(crate) recorded_version: Option<String>,
-    /// The simulated scene, if the log is a simulation.
+    /// Name of the simulated scene, if the log is a simulation.
     pub(crate) scene: Option<String>,
-    /// UTC at the zero of its clock, nanoseconds.
+    /// UTC at the zero of the log's clock, nanoseconds.
     pub(crate) utc_of_zero_ns: Option<i64>,
 }
 
@@ -83,7 +83,7 @@ pub(crate) fn run(
     Ok(Dive { report, vehicle: vehicle.name, about: about(&player) })
 }
 
-/// The vehicle file: the one given, or that of the log.
+/// The vehicle: from the parameters' vehicle file, or else from the log's.
 fn vehicle(log: &Path, player: &Player, parameters: &Parameters) -> Result<VehicleConfig, Error> {
     let info = player.info();
     let load = |name: &str| {
@@ -106,7 +106,7 @@ fn vehicle(log: &Path, player: &Player, parameters: &Parameters) -> Result<Vehic
     Ok(VehicleConfig::parse(Document::new(&name, text), &KINDS, &load)?)
 }
 
-/// Replays from the beginning to the end.
+/// Replays the log from its beginning to its end.
 fn straight(
     mut player: Stoppable<'_>,
     vehicle: &VehicleConfig,
@@ -129,7 +129,8 @@ fn straight(
     Ok(Report::of(&armed))
 }
 
-/// Replays with the filter, smooths, and replays along the smoothed trajectory, like `headrace replay --smooth`.
+/// Replays with the filter, smooths the result, and replays along the smoothed trajectory, like `headrace replay
+/// --smooth`.
 fn smoothed(
     log: &[PathBuf],
     player: &mut Player,
@@ -162,7 +163,7 @@ fn about(player: &Player) -> About {
 impl Parameters {
     /// Reads a vehicle file, and the files that it names, into the parameters.
     ///
-    /// Errors: it can't be read, or is invalid.
+    /// Errors: a file can't be read, or is invalid.
     pub fn read_vehicle(&mut self, path: &Path) -> Result<(), Error> {
         let failed = |source| Error::Read { path: path.to_owned(), source };
         let text = regular_file::read_text(path, TEXT_BYTES).map_err(failed)?;

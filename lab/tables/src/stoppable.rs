@@ -26,7 +26,7 @@ impl<'a> Stoppable<'a> {
 
     /// Checks whether a stop was requested.
     ///
-    /// Errors: it was.
+    /// Errors: a stop was requested.
     pub(crate) fn check(&self) -> Result<(), Error> {
         if !self.stop.load(Ordering::Relaxed) {
             return Ok(());

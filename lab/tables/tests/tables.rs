@@ -1,4 +1,5 @@
-//! Compares tables with the reports that `headrace replay` made of the same logs, and with their page.
+//! Compares tables with the reports that `headrace replay` made of the same logs, and with
+//! `docs/reference/dive-tables.csv`.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by them")]
 
@@ -22,7 +23,7 @@ fn tables(name: &str) -> Tables {
     replay(&[golden(&format!("{name}.mcap"))], &Parameters::default()).unwrap()
 }
 
-/// A value of a table as JSON.
+/// Converts a value of a table to JSON.
 fn value(batch: &RecordBatch, column: &str, row: usize) -> Value {
     let array = batch.column_by_name(column).unwrap_or_else(|| panic!("no column {column}"));
     if array.is_null(row) {
@@ -40,7 +41,7 @@ fn value(batch: &RecordBatch, column: &str, row: usize) -> Value {
     json!(array.as_string::<i32>().value(row))
 }
 
-/// Compares rows of a table with objects of a report: (column, path in the object).
+/// Asserts that rows of a table equal objects of a report, for pairs of a column and a path in the object.
 fn same(batch: &RecordBatch, objects: &Value, pairs: &[(&str, &str)]) {
     let objects = objects.as_array().unwrap();
     assert_eq!(batch.num_rows(), objects.len());
@@ -141,7 +142,7 @@ fn tables_match_reports() {
             &Value::Array(flagged),
             &[("chainage_m", "/start_m"), ("raised_s", "/flagged_s")],
         );
-        // `holes` contains every section's hole, and no other.
+        // `holes` contains every section's hole, and no other hole.
         let mut places: Vec<(u64, u64)> = Vec::new();
         for section in report["sections"].as_array().unwrap().iter().filter(|of| !of["hole_m"].is_null()) {
             let bits = |key: &str| section[key].as_f64().unwrap().to_bits();
@@ -192,7 +193,7 @@ fn parameters_reach_the_replay() {
 }
 
 #[test]
-fn losses_and_unreadable_logs_are_rows() {
+fn losses_and_unreadable_logs_appear_as_rows() {
     let folder = tempfile::tempdir().unwrap();
     let cut = folder.path().join("cut.mcap");
     let whole = std::fs::read(golden("stalls.mcap")).unwrap();
@@ -213,7 +214,7 @@ fn losses_and_unreadable_logs_are_rows() {
     assert_eq!(tables.sections.num_rows(), 0);
 }
 
-/// The page must have the tables as in the code. `RENEW=1 cargo test -p headrace_tables` rewrites them.
+/// The file must describe the tables as the code defines them. `RENEW=1 cargo test -p headrace_tables` rewrites it.
 #[test]
 fn page_has_every_column() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/dive-tables.csv");

@@ -1,8 +1,8 @@
 //! Decodes velocity reports into readings of velocity over ground.
 //!
 //! Device axes are x forward, y right, z down; headrace's are x forward, y left, z up, so y and z change sign. In air
-//! and close to surfaces the device is known to send wrong velocities as valid and to repeat reports. Both are
-//! withheld and counted by reason.
+//! and close to surfaces, the device is known to send wrong velocities as valid and to repeat reports. The decoder
+//! withholds such reports and counts them by reason.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_sensor::device::Decoder;
@@ -14,14 +14,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
-/// Longest usual gap within a line. It covers a TCP retransmission, whose timer is at least 200 ms.
+/// Longest usual gap within a line. It allows for a TCP retransmission, whose timer is at least 200 ms.
 const SILENCE: DurNs = DurNs::from_millis(1000);
 
-/// Least number of beams, because a velocity has three components.
+/// Minimum number of beams, since a velocity has three components.
 const LEAST_BEAMS: u8 = 3;
 /// Altitude range of an A50, m.
 const ALTITUDES_M: core::ops::RangeInclusive<f64> = 0.05..=50.0;
-/// Maximum delay within the device. The two-way travel time of sound is 70 ms.
+/// Maximum delay within the device. It is far above the two-way travel time of sound, 70 ms.
 const MOST_DELAY_US: i64 = 2_000_000;
 
 /// Decoding settings.
@@ -31,7 +31,7 @@ pub struct DecoderSettings {
     pub fom_max_mps: f64,
     /// Largest accepted speed, m/s.
     pub max_speed_mps: f64,
-    /// Delay from sending to receipt.
+    /// Delay from sending a report to its receipt.
     pub latency: DurNs,
 }
 
@@ -159,7 +159,8 @@ impl State {
     }
 }
 
-/// True if a report repeats the last: it has the same timestamp, or is bit-identical, which no new report is.
+/// Whether a report repeats the previous one: it has the same timestamp, or its values are bit-identical. Values of new
+/// reports always differ.
 fn repeats(report: &Velocity, last: &Velocity) -> bool {
     let [now, before] = [report, last].map(|report| report.times_us.map(|[validity, _]| validity));
     let values = |of: &Velocity| {

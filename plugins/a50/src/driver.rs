@@ -1,4 +1,4 @@
-//! Host side of the connection: it only listens.
+//! Host side of the connection. The driver only listens.
 
 use headrace_sensor::codec::Framing as _;
 use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Wire};
@@ -20,7 +20,7 @@ const NOT_UNDERSTOOD_FROM: u32 = 20;
 pub struct A50Driver {
     cutter: Cutter<Lines, MAX_LINE_BYTES>,
     velocities: u64,
-    /// Lines since the last velocity, and their format, if it is named.
+    /// Number of lines since the last velocity, and the name of their format, if they have one.
     others: u32,
     format: Option<String>,
 }
@@ -55,7 +55,7 @@ impl Driver for A50Driver {
                 *velocities += 1;
                 *others = 0;
             } else if let Some(named) = format_of(piece.bytes) {
-                // A report with a missing field is no frame, but its format name can still be read.
+                // A report with a missing field is no frame, but its format name is still readable.
                 *others = others.saturating_add(1);
                 *format = Some(named);
             } else if piece.is_frame {
@@ -80,11 +80,11 @@ impl Driver for A50Driver {
         let complaint = (self.others >= NOT_UNDERSTOOD_FROM).then(|| {
             let what = match &self.format {
                 Some(format) => {
-                    format!("sends lines of format {format} without a velocity that is understood")
+                    format!("sends lines of format {format} without a known velocity")
                 }
-                None => "sends lines without a velocity, and without their format".to_owned(),
+                None => "sends lines without a velocity or a format".to_owned(),
             };
-            format!("{what}; json_v3 to json_v3.3 are: see the device's firmware")
+            format!("{what}; supported are json_v3 to json_v3.3: check the device's firmware")
         });
         DeviceHealth { good_frames: self.velocities, complaint, ..DeviceHealth::default() }
     }

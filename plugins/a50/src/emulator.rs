@@ -6,7 +6,7 @@ use headrace_sensor::measurement::GroundVelocity;
 
 use crate::report::{Against, Velocity};
 
-/// Delay from the reflection of sound to sending the report; the maker's example has 189 ms.
+/// Delay from the reflection of sound to sending the report. In the maker's example it is 189 ms.
 const DELAY_US: i64 = 100_000;
 /// Device clock at power-on, microseconds since 1970.
 const BEGINS_US: i64 = 1_638_191_471_000_000;
@@ -15,16 +15,16 @@ const ALTITUDE_M: f64 = 1.0;
 /// Alternating figures of merit, because the decoder withholds identical reports as repeats.
 const FOMS_MPS: [f64; 2] = [0.001, 0.001_1];
 
-/// Emulation settings.
+/// Settings of the emulated device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
     /// Report rate, Hz.
     pub rate_hz: f64,
-    /// Delay from sending to receipt.
+    /// Delay from sending a report to its receipt.
     pub latency: DurNs,
 }
 
-/// Ideal device: no noise; values are quantised by the wire format only.
+/// An ideal emulated device: there is no noise, and only the wire format quantises values.
 #[derive(Debug, Clone)]
 pub struct A50Emulator {
     device: Simulated,
@@ -34,7 +34,7 @@ pub struct A50Emulator {
 }
 
 impl A50Emulator {
-    /// A device that is switched on, and first pings, at `start`.
+    /// Creates a device that is switched on, and first pings, at `start`.
     pub fn new(device: Simulated, start: MonoNs) -> Self {
         Self { device, start, begun: 0, told: 0 }
     }
@@ -53,7 +53,7 @@ impl Emulator<GroundVelocity> for A50Emulator {
     }
 
     fn tell(&mut self, moved: &GroundVelocity, line: LineSink<'_>) {
-        // The same conversion as from device axes: y and z change sign.
+        // Converts to device axes: y and z change sign, as in the opposite direction.
         let [x, y, z] = moved.velocity_mps.0.into();
         let at_us = BEGINS_US + moved.at.since(self.start).0 / 1000;
         let [even, odd] = FOMS_MPS;

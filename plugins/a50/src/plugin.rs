@@ -12,7 +12,7 @@ use crate::emulator::{A50Emulator, Simulated};
 /// Name in vehicle files.
 pub const NAME: &str = "a50";
 
-/// Room for some seconds of reports at the highest rate.
+/// Buffer for several seconds of reports at the highest rate.
 const RING_BYTES: usize = 1 << 17;
 
 /// The A50 device kind.

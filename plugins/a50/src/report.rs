@@ -1,4 +1,5 @@
-//! Lines of the device: a JSON object and a newline. Velocity reports are decoded; other objects are good but unused.
+//! Lines of the device. Each line is a JSON object and a newline. Velocity reports are decoded; other objects are
+//! accepted but unused.
 //!
 //! Source: Water Linked, "DVL A50/A125 TCP JSON API", json_v3 to json_v3.3.
 
@@ -16,7 +17,7 @@ pub const MAX_LINE_BYTES: usize = 4096;
 /// Maximum nesting of arrays and objects in a line; a report needs three levels.
 const MAX_DEPTH: usize = 8;
 
-/// Reference of a velocity.
+/// Medium relative to which a velocity is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Against {
     /// The ground, or a wall.
@@ -38,7 +39,7 @@ pub struct Velocity {
     pub altitude_m: f64,
     /// Number of valid beams.
     pub valid_beams: u8,
-    /// Validity of velocity and altitude according to the device.
+    /// Whether the device marks velocity and altitude as valid.
     pub is_valid: bool,
     /// Status bits: 1 = too hot; others are undefined.
     pub status: u8,
@@ -75,7 +76,7 @@ impl Velocity {
     }
 }
 
-/// Kind of a line that is a JSON object.
+/// Kind of a line that holds a JSON object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Line {
     Velocity(Velocity),
@@ -96,7 +97,8 @@ struct Found {
 }
 
 impl Found {
-    /// Reads the value of a key, which begins with `next`. A value of an unexpected type makes the report invalid.
+    /// Reads the value of a key; `next` is the value's first byte. A value of an unexpected type makes the report
+    /// invalid.
     fn take(&mut self, key: &[u8], next: u8, lexer: &mut SliceLexer<'_>) -> Result<(), Error> {
         let [x, y, z] = &mut self.velocity_mps;
         let [validity, transmission] = &mut self.times_us;
@@ -172,7 +174,7 @@ fn is_velocity(line: &str) -> Result<bool, Error> {
     Ok(is_velocity)
 }
 
-/// Parses a line; `None` if it is no object, or is a velocity report with a missing field.
+/// Parses a line; `None` if the line is no JSON object, or is a velocity report with a missing field.
 fn line(line: &[u8]) -> Option<Line> {
     let line = core::str::from_utf8(line).ok()?;
     if !is_velocity(line).ok()? {
@@ -187,7 +189,9 @@ fn line(line: &[u8]) -> Option<Line> {
     found.whole().map(Line::Velocity)
 }
 
-/// Calls `field` for each key of an object (escapes as sent) with the first byte of its value, which `field` must consume.
+/// Calls `field` for each key of an object, with the first byte of the key's value. `field` must consume the value.
+///
+/// Escapes in the key are not decoded.
 fn object<'a>(
     next: u8,
     lexer: &mut SliceLexer<'a>,
@@ -202,7 +206,7 @@ fn object<'a>(
     })
 }
 
-/// A string, escapes as sent.
+/// A string without its quotes. Escapes are not decoded.
 fn text<'a>(next: u8, lexer: &mut SliceLexer<'a>) -> Result<&'a [u8], Error> {
     let mut text = <&[u8]>::default();
     lexer.expect(|_| Some(next), b'"').ok_or(Expect::String)?;
@@ -221,7 +225,7 @@ fn boolean(next: u8, lexer: &mut SliceLexer<'_>) -> Result<bool, Error> {
     Ok(word.flatten().flatten().ok_or(Expect::Value)?)
 }
 
-/// Skips a value that holds no more than `depth` levels of arrays and objects.
+/// Skips a value that has at most `depth` levels of arrays and objects.
 fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error> {
     match next {
         b'[' | b'{' if depth == 0 => Err(Error::Depth),
@@ -236,8 +240,9 @@ fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error>
 /// Longest displayed name of a format.
 const MAX_FORMAT_BYTES: usize = 24;
 
-/// Format named by a line or a part of one, understood or not. Only letters, digits, `_` and `.` are accepted,
-/// because the name is displayed.
+/// Name of the format that a line, or a part of one, states. The format may be unknown to the decoder.
+///
+/// Only letters, digits, `_` and `.` are accepted, because the name is displayed.
 pub(crate) fn format_of(bytes: &[u8]) -> Option<String> {
     const KEY: &[u8] = b"\"format\"";
     let at = bytes.windows(KEY.len()).position(|window| window == KEY)?;
@@ -248,7 +253,7 @@ pub(crate) fn format_of(bytes: &[u8]) -> Option<String> {
     (!name.is_empty() && name.iter().all(is_plain)).then(|| String::from_utf8_lossy(&name).into_owned())
 }
 
-/// Framing of lines in a byte stream. A velocity report with a missing field is a bad line.
+/// Separates lines in a byte stream. A velocity report with a missing field is a bad line.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lines;
 
@@ -330,7 +335,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn other_lines_are_good_without_a_reading() {
+    fn other_lines_are_accepted_without_a_reading() {
         let mut codec = LineCodec::default();
         let lines = [POSITION, RESPONSE, "{}\n", EXAMPLE].concat();
         assert_eq!(decode_all(&mut codec, lines.as_bytes()).len(), 1);
@@ -369,13 +374,13 @@ pub(crate) mod tests {
         assert_eq!((got.len(), codec.counts().skipped_bytes), (1, endless.len() as u64));
     }
 
-    /// True if a line with this value is good.
+    /// Whether a line with this value is good.
     fn is_good(value: &str) -> bool {
         line(format!("{{\"a\":{value}}}\n").as_bytes()).is_some()
     }
 
     #[test]
-    fn depth_is_bounded() {
+    fn json_nesting_depth_is_bounded() {
         let nested = |depth: usize| ["[".repeat(depth), "]".repeat(depth)].concat();
         assert!(is_good(&nested(MAX_DEPTH - 1)));
         assert!(!is_good(&nested(MAX_DEPTH)));
@@ -450,13 +455,13 @@ pub(crate) mod tests {
         #![proptest_config(headrace_sensor::codec::contract::config())]
 
         #[test]
-        fn json_of_another_writer_is_accepted(value in any_value(), pretty in any::<bool>()) {
+        fn json_of_an_independent_writer_is_accepted(value in any_value(), pretty in any::<bool>()) {
             let text = if pretty { serde_json::to_string_pretty(&value) } else { serde_json::to_string(&value) };
             prop_assert!(is_good(&text.unwrap()));
         }
 
         #[test]
-        fn accepted_json_is_valid_for_another_reader(
+        fn accepted_json_is_valid_for_an_independent_parser(
             value in any_value(),
             at in any::<prop::sample::Index>(),
             byte in any::<u8>(),
@@ -470,7 +475,7 @@ pub(crate) mod tests {
         }
 
         #[test]
-        fn fields_match_another_reader(velocity in any_velocity()) {
+        fn fields_match_an_independent_parser(velocity in any_velocity()) {
             let line = velocity.encode();
             let value: Value = serde_json::from_slice(&line).unwrap();
             let got = decode_all(&mut LineCodec::default(), &line)[0];

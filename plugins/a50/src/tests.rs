@@ -46,7 +46,7 @@ fn decode(decoder: &mut A50Decoder, received: MonoNs, bytes: &[u8]) -> Vec<Decod
     readings
 }
 
-/// A report that is accepted.
+/// A report that the decoder accepts.
 fn good() -> Velocity {
     Velocity {
         against: Against::Bottom,
@@ -87,7 +87,7 @@ fn velocities_round_trip_with_their_times() {
 }
 
 #[test]
-fn reports_of_a_stationary_vehicle_are_no_repeats() {
+fn reports_of_a_stationary_vehicle_do_not_count_as_repeats() {
     let setup = EmulatorSetup { start: START, head: None, site: Site::default(), polled: true };
     let Emulated::VelocityLog(mut emulator) = configured("").unwrap().emulator(&setup) else { panic!() };
     let (mut due, mut heard, mut decoder) = (Vec::new(), 0, decoder());
@@ -155,7 +155,7 @@ fn repeated_reports_count_once() {
     let reports = [
         (good(), 1),
         (good(), 0),
-        // Same timestamp, different velocity.
+        // Same timestamp as before, different velocity.
         (Velocity { velocity_mps: [0.4, 0.0, 0.0], ..good() }, 0),
         (Velocity { velocity_mps: [0.4, 0.0, 0.0], times_us: later, ..good() }, 0),
         (Velocity { times_us: Some([1_200_000, 1_320_000]), ..good() }, 1),
@@ -188,7 +188,7 @@ impl Wire for Nowhere {
 
 #[test]
 fn unknown_format_is_reported_until_a_velocity_arrives() {
-    // Reports of older firmware have no type; a later one might call its fields something else.
+    // Reports of older firmware have no type. A later format might rename its fields.
     let older = EXAMPLE.replace("json_v3.2", "json_v1").replace("\"type\": \"velocity\", ", "");
     let renamed = EXAMPLE.replace("json_v3.2", "json_v9").replace("\"vx\"", "\"v_x\"");
     for (line, format) in [(older, "json_v1"), (renamed, "json_v9")] {
@@ -211,7 +211,7 @@ fn unknown_format_is_reported_until_a_velocity_arrives() {
 fn device_without_velocities_is_reported() {
     let mut driver = A50Driver::new();
     driver.heard(START, "{\"a\":1}\n".repeat(20).as_bytes(), &mut Nowhere);
-    assert!(driver.health().complaint.unwrap().contains("without a velocity, and without their format"));
+    assert!(driver.health().complaint.unwrap().contains("without a velocity or a format"));
     let mut driver = A50Driver::new();
     let with_escapes = "{\"format\":\"\u{1b}[31m\"}\n";
     driver.heard(START, with_escapes.repeat(20).as_bytes(), &mut Nowhere);

@@ -1,4 +1,4 @@
-//! Conversion of counts to pressure, with range and pressure mode from the sensor's memory or the vehicle file.
+//! Conversion of counts to pressure. Range and pressure mode come from the sensor's memory or the vehicle file.
 
 use headrace_sensor::geometry::math;
 use serde::{Deserialize, Serialize};
@@ -7,14 +7,14 @@ use crate::codec::MemoryWord;
 
 /// Cell of the calibration date and pressure mode.
 pub const CELL_SCALING0: u8 = 0x12;
-/// Cells of the lower limit, high and low word of a float.
+/// Cells of the lower limit: high and low word of a float.
 pub const CELLS_P_MIN: [u8; 2] = [0x13, 0x14];
-/// Cells of the upper limit, high and low word of a float.
+/// Cells of the upper limit: high and low word of a float.
 pub const CELLS_P_MAX: [u8; 2] = [0x15, 0x16];
 /// All cells of the calibration.
 pub const CALIBRATION_CELLS: [u8; 5] = [0x12, 0x13, 0x14, 0x15, 0x16];
 
-/// One standard atmosphere: default ambient pressure of a vented sensor.
+/// One standard atmosphere: the default ambient pressure of a vented sensor.
 pub const STANDARD_ATMOSPHERE_BAR: f64 = 1.013_25;
 
 const COUNTS_AT_P_MIN: f64 = 16_384.0;
@@ -24,15 +24,15 @@ const PA_PER_BAR: f64 = 1.0e5;
 /// Reference of a sensor's pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PressureMode {
-    /// PR: relative to ambient air, through a vent.
+    /// PR: relative to ambient air, which enters through a vent.
     Vented,
-    /// PA: relative to one bar, sealed in.
+    /// PA: relative to a sealed reference of one bar.
     Sealed,
     /// PAA: relative to vacuum.
     Absolute,
 }
 
-/// Content of cell 0x12.
+/// Content of cell 0x12: calibration date and pressure mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scaling0 {
     /// Year of calibration, 2010 to 2041.
@@ -45,7 +45,7 @@ pub struct Scaling0 {
     pub mode: u8,
 }
 
-/// A sensor's range and pressure mode, checked.
+/// A sensor's range and pressure mode, both checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calibration {
     mode: PressureMode,
@@ -75,7 +75,7 @@ pub enum CalibrationError {
 impl PressureMode {
     /// Converts the two bits of cell 0x12.
     ///
-    /// Errors: 3 or more; a wrong mode would shift the depth by ten metres.
+    /// Errors: 3 or more. A wrong mode would shift the depth by ten metres.
     pub fn from_wire(mode: u8) -> Result<Self, CalibrationError> {
         match mode {
             0 => Ok(Self::Vented),
@@ -104,7 +104,7 @@ impl PressureMode {
 }
 
 impl Scaling0 {
-    /// Unpacks the word.
+    /// Unpacks a memory word.
     #[expect(clippy::cast_possible_truncation, reason = "each field is masked to less than a byte")]
     pub fn from_word(word: u16) -> Self {
         let bits = |shift: u16, mask: u16| (word >> shift) & mask;
@@ -116,7 +116,7 @@ impl Scaling0 {
         }
     }
 
-    /// Packs the word; fields are truncated to their bits.
+    /// Packs the values into a memory word. Each field is truncated to its number of bits.
     pub fn to_word(self) -> u16 {
         (self.year.saturating_sub(2010) & 0x1F) << 11
             | (u16::from(self.month) & 0x0F) << 7
@@ -126,7 +126,7 @@ impl Scaling0 {
 }
 
 impl Calibration {
-    /// Limits in bar, relative to the mode's reference.
+    /// Creates a calibration from limits in bar, relative to the mode's reference.
     ///
     /// Errors: limits that aren't finite, or not increasing.
     pub fn new(mode: PressureMode, p_min_bar: f64, p_max_bar: f64) -> Result<Self, CalibrationError> {
@@ -136,7 +136,7 @@ impl Calibration {
         Ok(Self { mode, p_min_bar, p_max_bar })
     }
 
-    /// Absolute pressure in Pa; `ambient_bar` is the ambient air pressure, for a vented sensor.
+    /// Absolute pressure in Pa. A vented sensor uses `ambient_bar`, the pressure of the ambient air.
     pub fn pressure_pa(&self, counts: u16, ambient_bar: f64) -> f64 {
         let above_bar =
             (f64::from(counts) - COUNTS_AT_P_MIN) * (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN;
@@ -150,7 +150,7 @@ impl Calibration {
         u16::try_from(math::round_to_i64(counts).max(1)).unwrap_or(u16::MAX)
     }
 
-    /// Resolution: one count in Pa.
+    /// Resolution: the pressure of one count, Pa.
     pub fn resolution_pa(&self) -> f64 {
         (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN * PA_PER_BAR
     }
@@ -174,7 +174,7 @@ impl Calibration {
     }
 }
 
-/// Values of the vehicle file that override the sensor's memory, for logs that begin during a dive.
+/// Values of the vehicle file that override the sensor's memory. They are needed for logs that begin during a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Overrides {
     /// Lower limit, bar.
@@ -194,7 +194,7 @@ pub struct CalibrationCells {
 }
 
 impl CalibrationCells {
-    /// Stores a word; other cells are ignored.
+    /// Stores a word of the calibration. Words of other cells are ignored.
     pub fn note(&mut self, word: &MemoryWord) {
         let [p_min_high, p_min_low] = &mut self.p_min;
         let [p_max_high, p_max_low] = &mut self.p_max;
@@ -209,7 +209,7 @@ impl CalibrationCells {
         *cell = Some(word.word);
     }
 
-    /// The calibration, once every part is known; `overrides` take precedence over the memory.
+    /// The calibration; `None` until every part is known. `overrides` take precedence over the memory.
     ///
     /// Errors: an undefined mode, or impossible limits.
     pub fn calibration(&self, overrides: &Overrides) -> Result<Option<Calibration>, CalibrationError> {

@@ -1,4 +1,4 @@
-//! I2C transactions with the sensor: bytes written and then bytes read, as one message.
+//! I2C transactions with the sensor. A message has the bytes written, followed by the bytes read.
 //!
 //! ```text
 //!   measure      AC | status  pressure (2)  temperature (2)      6 bytes
@@ -20,7 +20,7 @@ pub const MEASURE_BYTES: usize = 6;
 /// Length of a memory read transaction.
 pub const MEMORY_BYTES: usize = 4;
 
-/// A status byte of a good result.
+/// Status byte of a successful transaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status(u8);
 
@@ -29,10 +29,10 @@ pub struct Status(u8);
 pub struct Measurement {
     /// Sensor status.
     pub status: Status,
-    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0, which a sensor returns before the
+    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0: a sensor returns 0 before the
     /// conversion is done.
     pub pressure_counts: u16,
-    /// Temperature in counts of 0.05 degrees / 16. Never 0, for the same reason.
+    /// Temperature in counts of 0.05 degrees / 16. Never 0: a sensor returns 0 before the conversion is done.
     pub temperature_counts: u16,
 }
 
@@ -43,7 +43,7 @@ pub struct MemoryWord {
     pub cell: u8,
     /// Sensor status.
     pub status: Status,
-    /// Its content.
+    /// Content of the cell.
     pub word: u16,
 }
 
@@ -56,7 +56,7 @@ pub enum Transaction {
     Memory(MemoryWord),
 }
 
-/// Reason why a transaction holds no result.
+/// A reason why a transaction has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TransactionError {
@@ -72,7 +72,7 @@ pub enum TransactionError {
     /// The sensor isn't in normal mode.
     #[error("reading the status: {0:#04X}, mode (bits 4 and 3) must be 00, normal")]
     Mode(u8),
-    /// The sensor's memory, and with it the calibration, is corrupt.
+    /// The sensor's memory is corrupt, and with it the calibration.
     #[error("reading the status: {0:#04X}, bit 2 says that the memory's checksum is wrong; it must be 0")]
     Memory(u8),
     /// Pressure or temperature of zero counts.
@@ -85,23 +85,23 @@ pub enum TransactionError {
         /// Temperature counts.
         temperature: u16,
     },
-    /// The first byte is neither the measure command nor a memory cell, or the length doesn't fit it.
+    /// The first byte is neither the measure command nor a memory cell, or the length doesn't match the first byte.
     #[error(
         "reading a transaction of {len} bytes that begins with {first:#04X}: allowed are AC with 6 bytes, and 00 to 7F with 4"
     )]
     Unknown {
-        /// First byte; 0 if there is none.
+        /// First byte; 0 if the transaction is empty.
         first: u8,
-        /// Its length.
+        /// Length of the transaction.
         len: usize,
     },
 }
 
 impl Status {
-    /// Ready, normal mode, memory sound.
+    /// Status of a sensor that is ready, in normal mode, and has sound memory.
     pub const IDLE: Self = Self(0x40);
 
-    /// Checks a status byte. Busy is accepted: this sensor reports it nearly always.
+    /// Checks a status byte. Busy is accepted, since this sensor nearly always reports busy.
     ///
     /// Errors: not ready, bus high, or wrong constant, mode or memory bits.
     /// Source: status checks of Blue Robotics' `KellerLD` library.
@@ -116,24 +116,24 @@ impl Status {
         }
     }
 
-    /// True if the sensor reports a conversion in progress.
+    /// Whether the sensor reports a conversion in progress.
     pub fn is_busy(self) -> bool {
         self.0 & 0x20 != 0
     }
 
-    /// The status byte.
+    /// The status as a byte.
     pub fn byte(self) -> u8 {
         self.0
     }
 }
 
 impl Measurement {
-    /// Temperature in degrees Celsius; the low four bits carry no information.
+    /// Temperature in degrees Celsius. The low four bits of the counts carry no information.
     pub fn temperature_degc(&self) -> f64 {
         (f64::from(self.temperature_counts >> 4) - 24.0) * 0.05 - 50.0
     }
 
-    /// The whole transaction.
+    /// Encodes the whole transaction.
     pub fn encode(&self) -> [u8; MEASURE_BYTES] {
         let [p1, p0] = self.pressure_counts.to_be_bytes();
         let [t1, t0] = self.temperature_counts.to_be_bytes();
@@ -142,7 +142,7 @@ impl Measurement {
 }
 
 impl MemoryWord {
-    /// The whole transaction.
+    /// Encodes the whole transaction.
     pub fn encode(&self) -> [u8; MEMORY_BYTES] {
         let [high, low] = self.word.to_be_bytes();
         [self.cell, self.status.0, high, low]
@@ -186,7 +186,7 @@ impl Transaction {
     }
 }
 
-/// Framing of transactions: one per message. A transaction with a bad status is counted as a bad frame.
+/// Separates transactions: each message is one transaction. A transaction with a bad status counts as a bad frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Transactions;
 

@@ -14,15 +14,15 @@ use crate::codec::{Bar100Codec, Measurement, Transaction};
 pub struct DecoderSettings {
     /// Values that override the sensor's memory.
     pub overrides: Overrides,
-    /// Ambient air pressure, bar; used for a vented sensor only.
+    /// Ambient air pressure, bar. Only a vented sensor uses it.
     pub ambient_bar: f64,
-    /// Withhold measurements whose status is busy.
+    /// Whether measurements with a busy status are withheld.
     pub reject_busy: bool,
     /// Delay from the measurement's time of validity to its receipt.
     pub latency: DurNs,
 }
 
-/// Decodes bytes into readings. Until the calibration is known, measurements are withheld and counted.
+/// Decodes bytes into readings. Measurements are withheld and counted until the calibration is known.
 #[derive(Debug, Clone)]
 pub struct Bar100Decoder {
     codec: Bar100Codec,
@@ -47,7 +47,7 @@ impl Stateful for Bar100Decoder {
 }
 
 impl Bar100Decoder {
-    /// New decoder without calibration.
+    /// Creates a decoder without a calibration.
     pub fn new(meaning: DecoderSettings) -> Self {
         let cells = CalibrationCells::default();
         let calibration = cells.calibration(&meaning.overrides);
@@ -56,7 +56,7 @@ impl Bar100Decoder {
 
     /// The calibration in use, if known.
     ///
-    /// Errors: impossible values in the sensor's memory.
+    /// Errors: the sensor's memory has impossible values.
     pub fn calibration(&self) -> Result<Option<Calibration>, CalibrationError> {
         self.calibration
     }
@@ -96,7 +96,7 @@ impl Decoder for Bar100Decoder {
         self.codec.counts()
     }
 
-    /// Measurements withheld because the calibration was unknown or invalid, or the status was busy.
+    /// Number of measurements withheld because the calibration was unknown or invalid, or the status was busy.
     fn withheld(&self) -> u64 {
         self.withheld
     }

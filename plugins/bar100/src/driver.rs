@@ -1,4 +1,4 @@
-//! Host side of the bus: reads the calibration, then measures at a fixed rate.
+//! Host side of the bus. The driver reads the calibration and then measures at a fixed rate.
 
 use headrace_sensor::driver::{Carrier, DeviceHealth, Driver, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -11,13 +11,15 @@ pub const CARRIERS: [Carrier; 2] = [Carrier::I2c, Carrier::Udp];
 
 /// Delay from requesting a memory cell to reading it. Source: Keller's protocol, at least 0.6 ms.
 const MEMORY_SETTLES: DurNs = DurNs(1_000_000);
-/// Delay from starting a conversion to reading its result. Source: Keller's protocol, 8 ms at most; drivers wait 9 or 10 ms.
+/// Delay from starting a conversion to reading its result. Source: Keller's protocol, at most 8 ms; other drivers wait
+/// 9 or 10 ms.
 const CONVERSION: DurNs = DurNs(10_000_000);
 /// Delay from reading the calibration to the first measurement. Source: `ArduPilot`'s driver.
 const AFTER_CALIBRATION: DurNs = DurNs::from_millis(150);
-/// Retry interval of reading the calibration.
+/// Interval between attempts to read the calibration.
 const RETRY: DurNs = DurNs::from_millis(500);
-/// Consecutive bad answers after which the calibration is read again: the sensor may have been replaced.
+/// Number of consecutive bad answers after which the calibration is read again, since the sensor may have been
+/// replaced.
 const READ_AGAIN_AFTER: u32 = 20;
 
 /// Driver of a Bar100.
@@ -44,7 +46,7 @@ impl Bar100Driver {
                 self.good_frames += 1;
                 self.complaint = None;
                 self.bad_in_a_row = 0;
-                // A second answer to the same request must not count for the next cell.
+                // A second answer to the same request must not count as the answer for the next cell.
                 let asked = CALIBRATION_CELLS.get(self.cell);
                 if matches!(&transaction, Transaction::Memory(read) if Some(&read.cell) == asked) {
                     self.cell += 1;
@@ -86,7 +88,7 @@ impl Driver for Bar100Driver {
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
-        // A cell without an answer is requested again.
+        // If a cell's request gets no answer, it is sent again.
         if let Some(cell) = CALIBRATION_CELLS.get(self.cell) {
             self.next_at = now + RETRY;
             wire.exchange(&[*cell], MEMORY_SETTLES, MEMORY_BYTES - 1);
@@ -124,8 +126,8 @@ mod tests {
         fn deliver(&mut self, _: MonoNs, _: &[u8]) {}
     }
 
-    /// After a late answer the driver requests the first cell twice. The second answer doesn't answer the next
-    /// request, which is lost and repeated.
+    /// After a late answer, the driver has requested the first cell twice. The second answer must not count for the
+    /// next cell, whose request is lost and repeated.
     #[test]
     fn late_answer_counts_for_no_other_cell() {
         let (mut driver, mut bus) = (Bar100Driver::new(10.0), Bus::default());

@@ -1,4 +1,4 @@
-//! Sensor side of the bus: answers requests for calibration and measurements.
+//! Sensor side of the bus. The emulator answers requests for calibration and measurements.
 //!
 //! Requests come from an emulated host at a fixed rate, or from a real host.
 
@@ -15,7 +15,7 @@ const CALIBRATED: Scaling0 = Scaling0 { year: 2021, month: 6, day: 15, mode: 0 }
 /// Ten degrees Celsius in counts: ((10 + 50) / 0.05 + 24) * 16.
 const TEMPERATURE_COUNTS: u16 = 0x4C80;
 
-/// Emulation settings.
+/// Settings of the emulated sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
     /// Range and pressure mode.
@@ -28,21 +28,21 @@ pub struct Simulated {
     pub latency: DurNs,
 }
 
-/// Ideal sensor: no noise and no added delay, but whole counts.
+/// An ideal emulated sensor: there is no noise and no added delay, but counts are whole numbers.
 #[derive(Debug, Clone)]
 pub struct Bar100Emulator {
     sensor: Simulated,
     start: MonoNs,
     begun: u64,
-    /// True if the host is emulated as well.
+    /// Whether the host is emulated as well.
     polled: bool,
-    /// Measurements requested by a real host, not yet started.
+    /// Measurements requested by a real host but not yet started.
     waiting: Vec<Pressure>,
     calibration_told: bool,
 }
 
 impl Bar100Emulator {
-    /// A sensor that is switched on, and first measures, at the setup's start.
+    /// Creates a sensor that is switched on, and first measures, at the setup's start.
     pub fn new(sensor: Simulated, setup: &EmulatorSetup) -> Self {
         let (start, polled) = (setup.start, setup.polled);
         Self { sensor, start, begun: 0, polled, waiting: Vec::new(), calibration_told: !polled }
@@ -79,7 +79,7 @@ impl Emulator<Pressure> for Bar100Emulator {
         due.extend(self.waiting.drain(..begun));
     }
 
-    /// Receives a host's request: bytes to write, then the number of bytes to read.
+    /// Receives a host's request: the bytes to write, then the number of bytes to read.
     fn hear(&mut self, at: MonoNs, bytes: &[u8], line: LineSink<'_>) {
         let Some(asked) = bytes.first() else { return };
         if *asked == MEASURE {
@@ -87,7 +87,7 @@ impl Emulator<Pressure> for Bar100Emulator {
             return;
         }
         let words = self.sensor.calibration.to_words(CALIBRATED);
-        // Other cells read as erased.
+        // Other cells return the value of erased memory.
         let word = words.iter().find(|(cell, _)| cell == asked).map_or(0xFFFF, |(_, word)| *word);
         let read = MemoryWord { cell: *asked, status: Status::IDLE, word };
         line(Direction::Received, at + self.sensor.latency, &read.encode());

@@ -13,7 +13,7 @@ use crate::emulator::{Bar100Emulator, Simulated};
 /// Name in vehicle files.
 pub const NAME: &str = "bar100";
 
-/// Room for two minutes of measurements at the usual rate.
+/// Buffer for two minutes of measurements at the usual rate.
 const RING_BYTES: usize = 1 << 16;
 
 /// Pressure range of the part as sold, bar.

@@ -1,8 +1,9 @@
-//! Host side of a head's line: keeps one command in flight, and the head on its program.
+//! Host side of a head's line. The driver keeps one command in flight, and keeps the head on its program.
 //!
-//! The driver first locates the head. It homes it the short way to its program's current position, and then requests
-//! each ping of the program when due. A late or lost answer puts the head behind. It catches up by being polled as
-//! soon as it has answered. A head far off its program (power-cycled, or turned away) is homed again.
+//! The driver first locates the head. It then homes the head, the short way, to the program's current position, and
+//! requests each ping of the program when due. After a late or lost answer the head lags. The driver then polls it as
+//! soon as it has answered, until it has caught up. A head far off its program (power-cycled, or turned by hand) is
+//! homed again.
 
 use std::collections::VecDeque;
 
@@ -25,16 +26,17 @@ const LEISURE: DurNs = DurNs::from_millis(60);
 /// Lower bounds of sound speed (m/s) and line rate (bit/s) for the answer timeout.
 const SLOWEST_SOUND_MPS: f64 = 1300.0;
 const LINE_BAUD: f64 = 115_200.0;
-/// Number of unanswered commands after which the head is polled less often. Source: LSTS DUNE retries after a second.
+/// Number of unanswered commands after which the head is polled less often. Source: LSTS DUNE, which retries after a
+/// second.
 const ASK_SELDOM_AFTER: u32 = 10;
 const SELDOM: DurNs = DurNs::from_millis(1_000);
-/// The driver homes a head that lags by more than 1/n of the program, or leads by more than a few pings.
+/// Limits beyond which a head is homed. It may lag by at most 1/n of the program, and lead by at most a few pings.
 const BEHIND_SHARE: u64 = 4;
 const AHEAD_PINGS: u64 = 10;
-/// If the head answers but lags by more than 1/n of the program, it is reported as too slow for its settings.
+/// A head that answers but lags by more than 1/n of the program is reported as too slow for its settings.
 const TOO_SLOW_SHARE: u64 = 8;
 
-/// Unanswered commands among the last 32 from which the line, not the head, is blamed for the lag.
+/// Number of unanswered commands, among the last 32, from which a lag is blamed on the line and not on the head.
 const LOSSY_FROM: u32 = 3;
 
 /// Purpose of a command.
@@ -42,9 +44,9 @@ const LOSSY_FROM: u32 = 3;
 enum Aim {
     /// Find the head's position.
     Locate,
-    /// Move it towards its program.
+    /// Move the head towards its program.
     Home,
-    /// Ping of this number in the program.
+    /// Request the ping of this number in the program.
     Ping(u64),
 }
 
@@ -60,12 +62,12 @@ pub struct HeadDriver {
     next_at: MonoNs,
     aim: Aim,
     way_home: VecDeque<Command>,
-    /// Program ping to continue with after homing.
+    /// Number of the program's ping that follows homing.
     joins_at: u64,
     unanswered: u32,
-    /// History of the last commands, one bit each, latest lowest: set if unanswered.
+    /// Whether each of the last 32 commands was unanswered. The lowest bit is the latest command.
     losses: u32,
-    /// True once the head has followed its program.
+    /// Whether the head has followed its program at least once.
     joined: bool,
     last_position: Option<u16>,
     foreign_id: Option<u8>,
@@ -74,7 +76,7 @@ pub struct HeadDriver {
 }
 
 impl HeadDriver {
-    /// Driver for a head with these settings. Without a program it rotates continuously from the sensor frame's 0.
+    /// Creates a driver for a head. Without a program, the head rotates continuously, starting at the sensor frame's 0.
     pub fn new(settings: Settings, setup: &DriverSetup) -> Self {
         let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
         let program = setup.head.unwrap_or(idle);
@@ -111,7 +113,7 @@ impl HeadDriver {
         self.asked = Some((self.aim, now));
     }
 
-    /// A ping at the dive's settings without a step, so that its return counts.
+    /// Command for a ping without a step. Its settings are those of the dive, so the return counts.
     fn standing_still(&self) -> Option<[u8; COMMAND_BYTES]> {
         Command { step_deg: 0.0, reverse: false, ..self.settings.command }.encode().ok()
     }
@@ -155,7 +157,7 @@ impl HeadDriver {
         self.timetable.ping(number).is_some_and(|ping| ping.position == position)
     }
 
-    /// Continues with a ping of the program when due, or at once if overdue.
+    /// Continues with a ping of the program when it is due, or at once if it is overdue.
     fn go_on(&mut self, number: u64, now: MonoNs) {
         self.joined = true;
         self.aim = Aim::Ping(number);
@@ -163,7 +165,7 @@ impl HeadDriver {
         self.behind = self.timetable.first_at(now).saturating_sub(number);
     }
 
-    /// Joins the program from the head's position.
+    /// Joins the program at the head's position, or homes the head if its position is too far off.
     fn join(&mut self, position: u16, clockwise: bool, now: MonoNs) {
         let current = self.timetable.first_at(now);
         let most_behind = if self.joined { self.timetable.len() / BEHIND_SHARE } else { 1 };
@@ -179,8 +181,8 @@ impl HeadDriver {
         let from = homing::Standing { angle_rad: self.settings.sensor_rad(position), growing };
         let current = self.timetable.first_at(now);
         self.joins_at = current;
-        // Fixed-point iteration: the homing distance depends on the program's position on arrival, which depends on
-        // that distance.
+        // The homing distance depends on the program's position on arrival, which depends on the homing distance:
+        // iterate.
         for _ in 0..3 {
             let Some(Planned { position, clockwise, .. }) = self.timetable.ping(self.joins_at).copied()
             else {
@@ -299,8 +301,8 @@ impl Driver for HeadDriver {
 
 /// Answer timeout of a command.
 ///
-/// It is twice the sum of three times: two-way travel time at the range setting, command and longest return on a
-/// serial line, and processing allowance.
+/// The timeout is twice the sum of three times: the two-way travel time at the range setting, the transmission of the
+/// command and the longest return on a serial line, and the processing allowance.
 fn answer_time(command: &Command) -> DurNs {
     let sound_s = 2.0 * f64::from(command.range_m) / SLOWEST_SOUND_MPS;
     let line_s = (COMMAND_BYTES + MAX_RETURN_BYTES) as f64 * 10.0 / LINE_BAUD;

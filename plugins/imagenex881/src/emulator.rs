@@ -1,4 +1,4 @@
-//! An emulated head, polled by an emulated host once per ping period, or by a real host.
+//! An emulated head. An emulated host polls it once per ping period, or a real host polls it.
 
 use std::collections::VecDeque;
 
@@ -16,11 +16,11 @@ use crate::program::Host;
 use crate::settings::Settings;
 use crate::stepping::{Head, Ping};
 
-/// Strength of an emulated echo at the wall; zero elsewhere.
+/// Strength of an emulated echo at the wall. The strength elsewhere is zero.
 const ECHO: u8 = 127;
 
 impl Ping {
-    /// Answer of a head with an echo at `range_m`, in metres at 1500 m/s.
+    /// A head's answer to a command, with an echo at `range_m`, in metres at 1500 m/s.
     pub fn answer(self, command: &Command, range_m: Option<f64>) -> Return {
         let heard = range_m
             .filter(|range| *range > 0.0 && *range >= command.min_range_m)
@@ -61,12 +61,12 @@ fn echo(tag: Tag, part: Option<f64>) -> Bytes<MAX_ECHO_BYTES> {
     Bytes::new(strengths.get(..points).unwrap_or_default()).unwrap_or_default()
 }
 
-/// Host and head on one line.
+/// An emulated head, with an emulated host if no real host polls.
 #[derive(Debug, Clone)]
 pub struct HeadEmulator {
     settings: Settings,
     latency: DurNs,
-    /// Metres measured by the head per true metre at the site.
+    /// Ratio of a range as measured by the head to the true range at the site.
     device_per_site: f64,
     /// The emulated host; `None` if a real host polls.
     host: Option<Host>,
@@ -78,7 +78,7 @@ pub struct HeadEmulator {
     asked: VecDeque<Asked>,
 }
 
-/// An executed command not yet answered.
+/// A command that has been executed but not yet answered.
 #[derive(Debug, Clone)]
 struct Asked {
     command: Command,
@@ -86,8 +86,9 @@ struct Asked {
 }
 
 impl HeadEmulator {
-    /// A head at its program's start that pings as soon as it is switched on. Without a program it rotates continuously from
-    /// the sensor frame's 0.
+    /// Creates a head that is at its program's start and pings as soon as it is switched on.
+    ///
+    /// Without a program, the head rotates continuously, starting at the sensor frame's 0.
     pub fn new(settings: Settings, latency: DurNs, setup: &EmulatorSetup) -> Self {
         let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
         let program = setup.head.unwrap_or(idle);
@@ -107,13 +108,13 @@ impl HeadEmulator {
         }
     }
 
-    /// Next command of the emulated host, executed.
+    /// Executes the next command of the emulated host.
     fn asked_now(&mut self) -> Option<Asked> {
         let command = self.host.as_mut()?.next_command();
         Some(Asked { command, ping: self.head.obey(&command) })
     }
 
-    /// Executes the commands in the bytes sent by a host at `at`; each begins a sounding.
+    /// Executes the commands in the bytes that a host sent at `at`. Each command begins a sounding.
     fn obey(&mut self, at: MonoNs, bytes: &[u8]) {
         let Self { settings, codec, head, asked, waiting, .. } = self;
         codec.push(bytes, &mut |command| {
@@ -130,7 +131,7 @@ impl HeadEmulator {
 impl Emulator<Sounding> for HeadEmulator {
     fn begin(&mut self, until: MonoNs, due: &mut Vec<Sounding>) {
         while let Some(host) = self.host.as_mut().filter(|_| self.ping_at < until) {
-            // Settings are checked on reading, so every command encodes.
+            // Settings are checked when they are read, so every command can be encoded.
             if let Ok(bytes) = host.next_command().encode() {
                 self.obey(self.ping_at, &bytes);
             }
@@ -145,7 +146,7 @@ impl Emulator<Sounding> for HeadEmulator {
     }
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
-        // An import gives soundings without `begin`, so the emulated host requests them here.
+        // Imported soundings come without `begin`, so the emulated host's command is requested here.
         let Some(Asked { command, ping }) = self.asked.pop_front().or_else(|| self.asked_now()) else {
             return;
         };

@@ -5,7 +5,7 @@ use headrace_sensor::sampling::head::HeadProgram;
 use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
 
-/// Range setting while homing, m: the shortest pings, and never the configured setting.
+/// Range setting while homing, m. It is the shortest one, and never the configured setting.
 const RANGE_M: u8 = 1;
 
 /// Position and stepping direction of a head.
@@ -13,14 +13,15 @@ const RANGE_M: u8 = 1;
 pub struct Standing {
     /// Angle in the sensor frame, radians.
     pub angle_rad: f64,
-    /// True if the next step increases the angle in the sensor frame.
+    /// Whether the next step increases the angle in the sensor frame.
     pub growing: bool,
 }
 
 /// Commands that move a head the short way to its program's start and leave it stepping in the program's direction.
 ///
-/// A head pings with every command. While homing it uses another range setting than the configured one, so that these
-/// returns don't count as samples. If only the direction is wrong, a last command reverses it without a step.
+/// A head pings with every command. The range setting while homing differs from the configured one, so that these
+/// returns don't count as samples. If only the direction is wrong, a last command reverses the direction without a
+/// step.
 pub fn commands(settings: &Settings, now: Standing, program: &HeadProgram) -> Vec<Command> {
     let normal = settings.angle_sign > 0.0;
     let half = COUNTS_PER_TURN / 2;
@@ -60,7 +61,7 @@ mod tests {
     use crate::settings::tests::settings;
     use crate::stepping::Head;
 
-    /// An emulated head executes the homing commands, then its program's first one.
+    /// An emulated head executes the homing commands, and then the first command of its program.
     #[test]
     fn homed_head_continues_with_its_program() {
         for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {

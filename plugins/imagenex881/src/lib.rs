@@ -1,6 +1,7 @@
 //! Imagenex 881L and 881A profiling heads: switch commands, returns, a decoder for the loop and an emulated head.
 //!
-//! Converts bytes to values and back without I/O; the port (TCP for the 881L, RS-485 for the 881A) is another layer.
+//! The crate converts bytes to values and back without I/O. The port (TCP for the 881L, RS-485 for the 881A) is another
+//! layer.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

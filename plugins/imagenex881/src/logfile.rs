@@ -1,6 +1,6 @@
 //! Log files of the maker's software: a 100-byte header before each raw return.
 //!
-//! Documented for the 852 (`.852`) and the 81S; inferred for the heads (`.81A`, `.81B`, `.31L`).
+//! The format is documented for the 852 (`.852`) and the 81S, and inferred for the heads (`.81A`, `.81B`, `.31L`).
 //! Source: Imagenex 852 file format.
 
 use headrace_sensor::geometry::time::DurNs;
@@ -12,14 +12,14 @@ const MONTHS: [[u8; 3]; 12] = [
     *b"Dec",
 ];
 
-/// Iterates over the shots of a log file. Ends after the first error.
+/// Iterates over the shots of a log file. The iteration ends after the first error.
 #[derive(Debug, Clone)]
 pub struct LogFile<'a> {
     bytes: &'a [u8],
     offset: usize,
 }
 
-/// One shot.
+/// One shot: a header and a return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shot<'a> {
     /// Three-letter model name.
@@ -28,17 +28,17 @@ pub struct Shot<'a> {
     pub date: Option<(u8, u8, u16)>,
     /// Time of day; `None` if the field isn't a time.
     pub time_of_day: Option<DurNs>,
-    /// Speed of sound setting of the software, m/s.
+    /// Speed of sound that is set in the software, m/s.
     pub sound_speed_mps: f64,
     /// The return as sent by the device.
     pub raw: &'a [u8],
 }
 
-/// Reason why a log file can't be read further.
+/// A reason why a log file can't be read further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogFileError {
-    /// No shot header at the expected offset.
+    /// There is no shot header at the expected offset.
     #[error("log file: shot at byte {offset} begins with {got:02X?}; allowed are 852, 81A, 81B, 81S, 31L")]
     Magic {
         /// Offset in the file.
@@ -51,9 +51,9 @@ pub enum LogFileError {
     Short {
         /// Offset in the file.
         offset: usize,
-        /// Bytes needed.
+        /// Number of bytes needed.
         needed: usize,
-        /// Bytes left.
+        /// Number of bytes left.
         left: usize,
     },
     /// The return is longer than the shot.
@@ -63,15 +63,15 @@ pub enum LogFileError {
     Lengths {
         /// Offset in the file.
         offset: usize,
-        /// Length of the shot by its header.
+        /// Length of the shot as stated in its header.
         total: usize,
-        /// Length of the return by its header.
+        /// Length of the return as stated in its header.
         raw: usize,
     },
 }
 
 impl<'a> LogFile<'a> {
-    /// Reads the bytes of a whole file.
+    /// Creates an iterator over the bytes of a whole file.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, offset: 0 }
     }
@@ -118,7 +118,7 @@ impl<'a> Iterator for LogFile<'a> {
     }
 }
 
-/// `DD-MMM-YYYY`.
+/// Parses a date, `DD-MMM-YYYY`.
 fn date(field: &[u8]) -> Option<(u8, u8, u16)> {
     let &[d0, d1, b'-', m0, m1, m2, b'-', y0, y1, y2, y3] = field else { return None };
     let month = (1..).zip(MONTHS).find(|(_, letters)| *letters == [m0, m1, m2])?.0;
@@ -126,7 +126,7 @@ fn date(field: &[u8]) -> Option<(u8, u8, u16)> {
     Some((two_digits(d0, d1)?, month, century * 100 + u16::from(two_digits(y2, y3)?)))
 }
 
-/// `HH:MM:SS`, a zero, `.hh`.
+/// Parses a time: `HH:MM:SS`, a zero byte, `.hh`.
 fn time_of_day(field: &[u8]) -> Option<DurNs> {
     let &[h0, h1, b':', m0, m1, b':', s0, s1, 0, b'.', c0, c1] = field else { return None };
     let part = |tens, ones, limit| two_digits(tens, ones).filter(|part| *part < limit).map(i64::from);
@@ -139,7 +139,7 @@ fn two_digits(tens: u8, ones: u8) -> Option<u8> {
     Some(digit(tens)? * 10 + digit(ones)?)
 }
 
-/// Speed of sound, in tenths of m/s if bit 15 marks it as set by the user.
+/// Speed of sound, m/s. Bit 15 marks a value set by the user, in tenths of m/s; otherwise the speed is 1500.
 fn sound_speed_mps(field: &[u8]) -> f64 {
     match *field {
         [high, low] if high & 0x80 != 0 => f64::from(u16::from_be_bytes([high & 0x7F, low])) / 10.0,
@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// Asserts that a stream codec finds every return in the whole file, skipping headers and fill.
+    /// Asserts that a stream codec finds every return in the whole file, and skips headers and fill bytes.
     fn check_stream(file: &[u8], expected: &[Return]) {
         for piece in [file.len(), 1, 97] {
             let (mut codec, mut got) = (ReturnCodec::default(), Vec::new());
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn file_that_is_no_log_is_identified() {
+    fn file_that_is_no_log_is_reported() {
         let error = LogFile::new(&[0x41; 200]).next().unwrap().unwrap_err();
         assert_eq!(error, LogFileError::Magic { offset: 0, got: [0x41; 3] });
         let mut lying = [0; 200];

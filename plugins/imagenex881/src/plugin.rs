@@ -22,10 +22,10 @@ use crate::settings::{Settings, range_setting};
 /// Name in vehicle files and logs.
 const NAME: &str = "imagenex881";
 
-/// Room for several seconds of the longest returns.
+/// Buffer for several seconds of the longest returns.
 const RING_BYTES: usize = 1 << 17;
 
-/// Longest usual gap within a return; after it an unfinished return is dropped.
+/// Longest usual gap within a return. An unfinished return is dropped after this gap.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// The Imagenex 881 device kind.
@@ -95,7 +95,7 @@ impl Device for Imagenex881 {
         Emulated::Head(Box::new(HeadEmulator::new(self.settings.clone(), self.sensor.latency, setup)))
     }
 
-    /// Replaces returns with an echo by profile-point-only returns.
+    /// Replaces returns that have an echo with returns that have only the profile point.
     fn without(&self, what: OptionalPayload, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
         shorter.clear();
         what == OptionalPayload::Echoes && without_echoes(packet, shorter).is_some()
@@ -114,8 +114,9 @@ impl Device for Imagenex881 {
     }
 }
 
-/// Writes a packet of whole returns with each reduced to its profile point (`IPX`); `None` if the packet holds anything else,
-/// or no echo.
+/// Reduces each return of a packet to its profile point (`IPX`), and writes the result to `shorter`.
+///
+/// `None` if the packet holds anything except whole returns, or holds no echo.
 fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     let mut rest = packet;
     while !rest.is_empty() {
@@ -127,7 +128,7 @@ fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
             }
             _ => whole,
         };
-        // Returns that don't re-encode identically are left unchanged.
+        // A packet is left unchanged if one of its returns doesn't re-encode identically.
         (whole.encode().ok()?.as_slice() == frame).then_some(())?;
         shorter.extend_from_slice(point.encode().ok()?.as_slice());
         rest = after;
@@ -138,15 +139,15 @@ fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
 /// Number of whole returns without a reading, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Rejected {
-    /// The head rejected the command, or lost characters of it.
+    /// The head rejected the command, or lost characters of the command.
     pub status: u64,
-    /// From another head id.
+    /// The return is from another head id.
     pub head_id: u64,
-    /// From a GS model, whose extra fields aren't known well enough.
+    /// The return is from a GS model, whose additional fields aren't known well enough.
     pub tag: u64,
-    /// At a range setting other than the configured one.
+    /// The range setting differs from the configured one.
     pub range_setting: u64,
-    /// Profile range beyond the range setting.
+    /// The profile range is beyond the range setting.
     pub beyond_range: u64,
 }
 
@@ -166,7 +167,7 @@ pub struct HeadDecoder {
 
 stateful!(HeadDecoder { state: codec, clock, reader; });
 
-/// Converts whole returns to readings; separate from the codec, so that both can be borrowed.
+/// Converts whole returns to readings. It is separate from the codec, so that both can be borrowed.
 #[derive(Debug, Clone)]
 struct Reader {
     settings: Settings,
@@ -177,7 +178,7 @@ struct Reader {
 stateful!(Reader { state: rejected; fixed: settings, latency; });
 
 impl HeadDecoder {
-    /// Decoder with these settings. A position past +180 degrees makes a frame bad, whatever the head id.
+    /// Creates a decoder. A position past +180 degrees makes a frame bad, whatever the head id.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
         let reader = Reader { settings, latency, rejected: Rejected::default() };
         let codec = ReturnCodec::new(Returns { model: Some(Model::Head881) });

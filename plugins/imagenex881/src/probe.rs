@@ -1,4 +1,4 @@
-//! Probes for a head with one short ping without a step.
+//! Probes for a head with one short ping that moves the head by no step.
 
 use headrace_sensor::codec::Codec as _;
 use headrace_sensor::driver::Probe;
@@ -11,7 +11,7 @@ const HEAD_IDS: [u8; 4] = [0x10, 0x11, 0x12, 0x13];
 /// Degrees per position count.
 const DEGREES_A_COUNT: f64 = 0.3;
 
-/// Polls the head ids and accepts the first whole return as the answer.
+/// Polls the probed head ids, and accepts the first whole return as the answer.
 #[derive(Debug, Clone, Default)]
 pub struct HeadProbe {
     codec: ReturnCodec,
@@ -54,7 +54,7 @@ impl Probe for HeadProbe {
 
     fn identity(&self) -> Option<String> {
         let Header { tag, head_id, status, position, .. } = self.found?;
-        // Sounders share this id; their positions have no meaning.
+        // Sounders share this id, but their positions have no meaning.
         if Model::of_head_id(head_id) == Model::Sounder852 {
             return Some(format!("Imagenex 881 family or 852 sounder, head_id = {head_id:#04x}"));
         }

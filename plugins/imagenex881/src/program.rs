@@ -7,11 +7,11 @@ use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, step_at_most, step_d
 use crate::settings::{Settings, counts_of_rad};
 use crate::stepping::Head;
 
-/// Host side: generates the commands that keep a head on its program.
+/// Host side of a head: generates the commands that keep the head on its program.
 ///
-/// Sectors are swept with steps and reversals. The head's own sector settings aren't used, because they allow
-/// multiples of 3 degrees only. Both ends of a sector are pinged, each once per sweep. If the step doesn't divide the
-/// sector, the last step before an end is shorter.
+/// Sectors are swept with steps and reversals. The head's own sector settings aren't used, because they allow multiples
+/// of 3 degrees only. Each sweep pings both ends of the sector, each end once. If the sector isn't a multiple of the
+/// step, the last step before an end is shorter.
 #[derive(Debug, Clone)]
 pub struct Host {
     command: Command,
@@ -20,7 +20,7 @@ pub struct Host {
     sector: Option<Sector>,
 }
 
-/// A sector in counts, and the head's offset above its lower end.
+/// A sector in counts, with the head's offset above the sector's lower end.
 #[derive(Debug, Clone, Copy)]
 struct Sector {
     size: i32,
@@ -28,7 +28,7 @@ struct Sector {
 }
 
 impl Host {
-    /// Host for a head at the program's start, stepping in the program's initial direction.
+    /// Creates the host of a head that is at the program's start and steps in the program's initial direction.
     pub fn new(settings: &Settings, program: &HeadProgram) -> Self {
         let normal = settings.angle_sign > 0.0;
         Self {
@@ -43,12 +43,12 @@ impl Host {
         }
     }
 
-    /// True if the next step increases the position.
+    /// Whether the next step increases the position.
     pub fn growing(&self) -> bool {
         self.growing
     }
 
-    /// The next command. The head pings at its position, then steps.
+    /// The next command. The head pings at its position and then steps.
     pub fn next_command(&mut self) -> Command {
         let Some(Sector { size, along }) = &mut self.sector else { return self.command };
         let to_end = |growing| if growing { *size - *along } else { *along };
@@ -74,13 +74,13 @@ impl Sector {
 pub struct Planned {
     /// Head position, 0 to 1199.
     pub position: u16,
-    /// True if the head's next step, before the command, would increase the position.
+    /// Whether the step that follows the previous ping, before this command, would increase the position.
     pub clockwise: bool,
-    /// Command that requests the ping and sets the next step.
+    /// Encoded command that requests the ping and sets the next step.
     pub command: [u8; COMMAND_BYTES],
 }
 
-/// A periodic program in time: ping k is due k ping periods after the start of the dive.
+/// A periodic program with times: ping k is due k ping periods after the dive's start.
 #[derive(Debug, Clone)]
 pub struct Timetable {
     pings: Vec<Planned>,
@@ -88,11 +88,11 @@ pub struct Timetable {
     period: DurNs,
 }
 
-/// Maximum period of a program, in pings; a slow sector has 2,400.
+/// Maximum period of a program, in pings. A slow sector has 2,400.
 const MAX_PINGS: usize = 10_000;
 
 impl Timetable {
-    /// Program of a head that is at its start when the dive begins.
+    /// Creates the program of a head that is at the program's start when the dive begins.
     pub fn new(settings: &Settings, program: &HeadProgram, begun: MonoNs) -> Self {
         let mut host = Host::new(settings, program);
         let mut head = Head::new(settings.position(program.start_rad), host.growing());
@@ -105,7 +105,7 @@ impl Timetable {
             }
             let command = host.next_command();
             let ping = head.obey(&command);
-            // Settings are checked on reading, so every command encodes.
+            // Settings are checked when they are read, so every command can be encoded.
             let Ok(command) = command.encode() else { break };
             pings.push(Planned { position: ping.position, clockwise: before.1, command });
         }
@@ -117,12 +117,12 @@ impl Timetable {
         self.pings.len() as u64
     }
 
-    /// True if the program has no pings, which never happens.
+    /// Whether the program has no pings, which never happens.
     pub fn is_empty(&self) -> bool {
         self.pings.is_empty()
     }
 
-    /// Ping number `number`.
+    /// Finds ping number `number` of the periodic program.
     pub fn ping(&self, number: u64) -> Option<&Planned> {
         let place = number.checked_rem(self.len())?;
         self.pings.get(usize::try_from(place).ok()?)

@@ -8,7 +8,7 @@ use headrace_sensor::sampling::head::{Basis, HeadBody, HeadMode, Turn};
 
 use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, SOUND_SPEED_MPS, ZERO_COUNT};
 
-/// A scan mode by the maker's name: step and turn period.
+/// A scan mode with its name, step and turn period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mode {
     /// Name in vehicle files.
@@ -28,10 +28,10 @@ pub const MODES: [Mode; 5] = [
     Mode { name: "fastest", step_counts: 8, turn_ms: 4_800 },
 ];
 
-/// Range setting of the table of modes, m.
+/// Range setting for which the table of modes states turn periods, m.
 const TABLE_RANGE_M: u8 = 10;
 
-/// A measured turn period.
+/// A turn period measured in one mode at one range setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MeasuredTurn {
     step_counts: u8,
@@ -39,11 +39,11 @@ struct MeasuredTurn {
     period: DurNs,
 }
 
-/// Default housing of the family's heads about the beam. Source: radius from Jorge et al. 2021, §8.3; the lengths are
+/// Default housing of the family's heads, about the beam. Source: radius from Jorge et al. 2021, §8.3. The lengths are
 /// estimates.
 const USUAL_BODY: HeadBody = HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 };
 
-/// Checked settings of a head: every command built from them can be encoded.
+/// Checked settings of a head. Every command built from these settings can be encoded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Command that requests a ping in mid-turn.
@@ -52,7 +52,7 @@ pub struct Settings {
     pub step_counts: u8,
     /// Ping period.
     pub ping_period: DurNs,
-    /// +1 if device angles grow with the sensor frame's, else -1.
+    /// +1 if device angles increase with the sensor frame's angles, else -1.
     pub angle_sign: f64,
     /// Sensor angle at device angle 0, radians.
     pub angle_offset_rad: f64,
@@ -64,11 +64,11 @@ pub struct Settings {
 impl Settings {
     /// Reads a head's keys.
     ///
-    /// Errors: a key missing or not allowed, or a latency not below the ping period.
+    /// Errors: a key is missing or not allowed, or the latency isn't below the ping period.
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
         let choices = MODES.map(|mode| (mode.name, mode));
         let known = own.required("mode", own.choice("mode", &choices)?);
-        // Without a mode, the other keys are checked with any mode.
+        // Without a mode, the other keys are checked with an arbitrary mode.
         let mode = *known.as_ref().unwrap_or(&MODES[0]);
         let command = command(mode, own)?;
         let measured = measured_turns(mode, command.range_m, own)?;
@@ -118,33 +118,33 @@ impl Settings {
         self.angle_sign * rad_of_counts(i32::from(position) - ZERO_COUNT) + self.angle_offset_rad
     }
 
-    /// Head position nearest to a sensor-frame angle: 0 to 1199.
+    /// Head position nearest to a sensor-frame angle, 0 to 1199.
     pub fn position(&self, sensor_rad: f64) -> i32 {
         let device_rad = self.angle_sign * (sensor_rad - self.angle_offset_rad);
         (counts_of_rad(device_rad) + ZERO_COUNT).rem_euclid(COUNTS_PER_TURN)
     }
 }
 
-/// Nearest number of counts of an angle in radians; clamped to a thousand turns either way.
+/// Number of counts nearest to an angle in radians. Angles beyond a thousand turns are clamped.
 pub(crate) fn counts_of_rad(angle_rad: f64) -> i32 {
     let most = i64::from(COUNTS_PER_TURN) * 1000;
     let counts = math::round_to_i64(angle_rad * f64::from(COUNTS_PER_TURN) / TAU).clamp(-most, most);
     i32::try_from(counts).unwrap_or(0)
 }
 
-/// Counts in radians.
+/// Converts counts to radians.
 fn rad_of_counts(counts: i32) -> f64 {
     f64::from(counts) * TAU / f64::from(COUNTS_PER_TURN)
 }
 
 /// Converts a range to the head's setting.
 ///
-/// Errors: a range that is no setting of the head, as text.
+/// Errors: a text, if the head has no such setting.
 pub fn range_setting(range_m: f64) -> Result<u8, String> {
     RANGES_M
         .into_iter()
         .find(|setting| (f64::from(*setting) - range_m).abs() < 1e-9)
-        .ok_or_else(|| format!("{range_m} m is no range setting of the head; it has {RANGES_M:?}"))
+        .ok_or_else(|| format!("{range_m} m is not a range setting of the head; it has {RANGES_M:?}"))
 }
 
 /// Modes at a range setting for a head without measured turn periods.
@@ -176,9 +176,9 @@ fn pings_a_turn(mode: Mode) -> i32 {
 
 /// Turn period at a range setting.
 ///
-/// It comes from the maker's table and the periods measured in this mode. At a known range it is the known value.
-/// Between two ranges it is interpolated linearly. Beyond them it is extrapolated by the two-way travel time per
-/// ping. The rest of the ping period (stepping, line) doesn't depend on range.
+/// Known periods are the maker's table and the periods measured in this mode. At a known range, the period is the known
+/// value. Between two known ranges, the period is interpolated linearly. Beyond the known ranges, it is extrapolated by
+/// the two-way travel time per ping, since the rest of the ping period (stepping, line) doesn't depend on range.
 fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Basis) {
     let table = MeasuredTurn {
         step_counts: mode.step_counts,
@@ -211,18 +211,18 @@ fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Ba
     }
 }
 
-/// Measured turn periods of the vehicle file: `turn_period_s` at the configured mode and range, and those of the
+/// Measured turn periods of the vehicle file: `turn_period_s` for the configured mode and range, and the periods of the
 /// `measured_turns` tables.
 fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<MeasuredTurn>, ConfigError> {
     let mut measured = Vec::new();
     let possible = |step_counts: u8, range_m: u8, turn_s: f64| {
-        // Each ping waits for its two-way travel time.
+        // A turn takes at least the two-way travel time of each of its pings.
         let pings = f64::from(COUNTS_PER_TURN / i32::from(step_counts));
         let least_s = pings * 2.0 * f64::from(range_m) / SOUND_SPEED_MPS;
         if turn_s >= least_s {
             return Ok(());
         }
-        Err(format!("is less than the {least_s:.2} s that sound alone takes at a range of {range_m} m"))
+        Err(format!("is less than the {least_s:.2} s that the sound alone takes at a range of {range_m} m"))
     };
     if let Some(turn_s) = own.number("turn_period_s", TURN_S)? {
         possible(mode.step_counts, range_m, turn_s).map_err(|why| own.invalid("turn_period_s", &why))?;
@@ -234,7 +234,8 @@ fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<Meas
         let step_counts = table.required("mode", table.choice("mode", &choices)?)?;
         let range_m = table.required("range_m", table.integer("range_m", 1..=100)?)?;
         let range_m = u8::try_from(range_m).ok().filter(|range| RANGES_M.contains(range));
-        let range_m = range_m.ok_or_else(|| table.invalid("range_m", "is no range setting of the head"))?;
+        let range_m =
+            range_m.ok_or_else(|| table.invalid("range_m", "is not a range setting of the head"))?;
         let turn_s = table.required("turn_period_s", table.number("turn_period_s", TURN_S)?)?;
         possible(step_counts, range_m, turn_s).map_err(|why| table.invalid("turn_period_s", &why))?;
         if measured
@@ -272,7 +273,7 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
         [("profile", (true, Points::P250)), ("imx", (false, Points::P250)), ("igx", (false, Points::P500))];
     let (profile, points) = own.choice("returns", &returns)?.unwrap_or((true, Points::P250));
     let command = Command {
-        // Up to 252: 253 is the command terminator.
+        // The maximum is 252, since 253 terminates a command.
         head_id: byte("head_id", 0..=252, 0x10)?,
         range_m,
         reverse: false,
@@ -291,12 +292,12 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
         switch_delay_ms: 0.0,
         frequency_khz: frequency_khz as f64,
     };
-    // All settings except the range are within their keys' limits.
+    // All settings except the range are already checked against their keys' limits.
     command.encode().map_err(|error| own.invalid("range_m", &error.to_string()))?;
     Ok(command)
 }
 
-/// Default pulse length for a range. Source: the settings usual for profiling heads of the family.
+/// Default pulse length for a range setting. Source: the settings usual for profiling heads of the family.
 pub(crate) fn usual_pulse_us(range_m: u8) -> f64 {
     const PULSES_US: [u16; RANGES_M.len()] = [20, 20, 20, 20, 60, 60, 100, 160, 220, 260, 320, 420, 540];
     let pulse = RANGES_M.into_iter().zip(PULSES_US).find(|(range, _)| *range == range_m);
@@ -321,7 +322,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Settings from the text of a table.
+    /// Settings from the text of a vehicle file's table.
     pub(crate) fn settings(text: &str) -> Result<Settings, ConfigError> {
         let root = Document::new("v.toml", text).root()?;
         let settings = Settings::read(&sensor(), &root)?;

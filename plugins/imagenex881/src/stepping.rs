@@ -1,18 +1,18 @@
-//! Motion of a head: a ping at its position, then a step set by the command, within the command's sector.
+//! Motion of a head. With each command the head pings at its position and then steps, within the command's sector.
 
 use crate::codec::{COUNTS_PER_TURN, Command, ZERO_COUNT};
 use crate::settings::counts_of_rad;
 
-/// A ping's position, and the direction of the step after it.
+/// Position of a ping, and direction of the step after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ping {
     /// Position, 0 to 1199.
     pub position: u16,
-    /// True if the step increases the position.
+    /// Whether the step after the ping increases the position.
     pub clockwise: bool,
 }
 
-/// A head's position and direction.
+/// Position and direction of a head.
 #[derive(Debug, Clone)]
 pub struct Head {
     position: i32,
@@ -20,7 +20,7 @@ pub struct Head {
 }
 
 impl Head {
-    /// A head at `position` (0 to 1199), stepping towards increasing positions if `growing`.
+    /// Creates a head at `position` (0 to 1199) that steps towards larger positions if `growing`.
     pub fn new(position: i32, growing: bool) -> Self {
         Self { position: position.rem_euclid(COUNTS_PER_TURN), growing }
     }
@@ -30,7 +30,7 @@ impl Head {
         self.position
     }
 
-    /// True if the next step increases the position.
+    /// Whether the next step increases the position.
     pub fn growing(&self) -> bool {
         self.growing
     }
@@ -44,7 +44,7 @@ impl Head {
         Ping { position, clockwise: self.growing }
     }
 
-    /// Position after the command's step; reverses at the ends of a sector narrower than a full turn.
+    /// Position after the command's step. The head reverses at the ends of a sector narrower than a full turn.
     fn next_position(&mut self, command: &Command) -> i32 {
         let step = command.step_counts();
         if command.sector_deg >= 360.0 {

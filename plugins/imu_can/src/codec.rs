@@ -32,9 +32,9 @@ pub enum Message {
 }
 
 impl MessageSet {
-    /// Decodes a frame; `None` if it isn't of this set, as for all remote and error frames.
+    /// Decodes a frame; `None` if the frame isn't of this set. Remote and error frames are of no set.
     ///
-    /// Errors: an identifier of the set with a wrong length.
+    /// Errors: the identifier is of this set, but the length is wrong.
     pub fn decode(&self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {
         Ok(match self {
             Self::Xsens(ids) => ids.decode(frame)?.map(Message::Xsens),
@@ -44,7 +44,7 @@ impl MessageSet {
         })
     }
 
-    /// Encodes a message; `None` if it is of another set.
+    /// Encodes a message; `None` if the message is of another set.
     pub fn encode(&self, message: &Message) -> Option<CanFrame> {
         match (self, message) {
             (Self::Xsens(ids), Message::Xsens(message)) => Some(ids.encode(message)),
@@ -58,8 +58,8 @@ impl MessageSet {
 
 /// Decodes bytes into messages of one set.
 ///
-/// Other devices' frames, remote frames and error frames are good frames without a message; a frame of the set with a wrong
-/// length is bad, as is a message that holds no classic frame.
+/// Other devices' frames, remote frames and error frames are good frames without a message. A frame of the set with a
+/// wrong length is bad. A message that holds no classic frame is bad, too.
 pub type ImuCodec = Framed<MessageSet, FRAME_BYTES>;
 
 impl Framing for MessageSet {

@@ -1,4 +1,4 @@
-//! Decodes messages into readings on arrival; the frames of one sample come back to back.
+//! Decodes messages into readings on arrival. A unit sends the frames of one sample back to back.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _};
 use headrace_sensor::device::Decoder;
@@ -17,7 +17,7 @@ const MICROSECOND: DurNs = DurNs(1000);
 /// Axis order of a J1939 unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AxisOrder {
-    /// Standard order: pitch, roll, yaw; lateral, longitudinal, vertical. Figures of merit and latency are applied.
+    /// Standard order: pitch, roll, yaw; lateral, longitudinal, vertical. Figures of merit and latency are used.
     Yxz,
     /// `OpenIMU` order: x, y, z. Its maker says to ignore the figures of merit and the latency.
     Xyz,
@@ -51,14 +51,14 @@ stateful!(ImuDecoder { state: codec, state, passed_over; });
 struct State {
     meaning: DecoderSettings,
     invalid: Invalid,
-    /// True after the first quaternion. Euler angles are ignored from then on, so that the attitude isn't used twice.
+    /// Whether a quaternion has been received. Euler angles are then ignored, so that no attitude is used twice.
     sends_quaternions: bool,
     sample_time_ticks: Option<u32>,
     clock: Option<SampleTimes>,
     stamped_by_filter: Option<bool>,
     received: MonoNs,
     group: Option<u16>,
-    /// Components received since the last complete vector.
+    /// Components of acceleration received since the last complete vector.
     acceleration_mps2: [Option<f64>; 3],
     withheld: u64,
 }
@@ -73,7 +73,7 @@ struct Invalid {
     force: bool,
 }
 
-/// A reading, with the device's own delay if it sends one.
+/// A reading and the delay within the device, which is zero if the device sends none.
 type Told = Option<(Reading, DurNs)>;
 
 impl AxisOrder {
@@ -87,7 +87,7 @@ impl AxisOrder {
 }
 
 impl ImuDecoder {
-    /// New decoder.
+    /// Creates a decoder.
     pub fn new(meaning: DecoderSettings) -> Self {
         let state = State {
             meaning,
@@ -109,13 +109,13 @@ impl ImuDecoder {
         self.passed_over
     }
 
-    /// Unit timestamp of its last sample, if sent; wraps.
+    /// Timestamp of the unit's last sample, if the unit sends timestamps. The timestamp wraps.
     pub fn sample_time(&self) -> Option<DurNs> {
         let ticks = self.state.sample_time_ticks?;
         Some(DurNs(self.state.meaning.sample_time_tick.0.saturating_mul(i64::from(ticks))))
     }
 
-    /// Number of the unit's last sample, if sent; wraps.
+    /// Number of the unit's last sample, if the unit sends numbers. The number wraps.
     pub fn group(&self) -> Option<u16> {
         self.state.group
     }
@@ -144,7 +144,7 @@ impl Decoder for ImuDecoder {
         self.codec.counts()
     }
 
-    /// Values withheld as marked invalid by the unit.
+    /// Number of values withheld because the unit marked them invalid.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -183,7 +183,7 @@ impl State {
             }
             M::RateOfTurn(raw) => return self.rate(scaled(raw, xsens::RATE_QUANTUM_RADPS)),
             M::Acceleration(raw) => return self.force(scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)),
-            // High-rate messages are ignored: sources disagree on the two codes.
+            // High-rate messages are ignored, because sources disagree about which code is which.
             _ => (),
         }
         None
@@ -215,7 +215,7 @@ impl State {
     fn take_j1939(&mut self, message: &j1939::Message) -> Told {
         let order = self.meaning.axis_order;
         let (triple, told) = match message {
-            // Pitch and roll without yaw are no full attitude; the filter gets them from gravity.
+            // Pitch and roll without yaw are no full attitude. The navigation filter gets pitch and roll from gravity.
             j1939::Message::Slope(_) => return None,
             j1939::Message::AngularRate(triple) => {
                 let rates = triple.rates_degps().map(|degps| degps.map(f64::to_radians));
@@ -234,8 +234,9 @@ impl State {
         Some((reading, DurNs::from_secs_f64(delay_ms / 1000.0)))
     }
 
-    /// The unit has no turn rate about its pitch axis, so no turn rate is reported. Acceleration is reported once all
-    /// three components have arrived.
+    /// Handles a message of a Bosch unit; returns the acceleration once all three components have arrived.
+    ///
+    /// Turn rates are not reported, since the unit has none about its pitch axis.
     fn take_bosch(&mut self, message: bosch::Message) -> Told {
         let [x, y, z] = &mut self.acceleration_mps2;
         match message {
@@ -248,7 +249,7 @@ impl State {
         force(complete)
     }
 
-    /// Handles a timestamp of an SBG unit; only the kind that arrived first is followed.
+    /// Handles a timestamp of an SBG unit. Only the kind of timestamp that arrived first is used.
     ///
     /// The unit stamps samples and filter solutions with one clock but at different times.
     fn sbg_stamp(&mut self, time_us: u32, of_filter: bool) {

@@ -1,11 +1,11 @@
-//! Host side of the bus: it only listens.
+//! Host side of the bus. The driver only listens.
 
 use headrace_sensor::driver::{Carrier, MessageListener};
 use headrace_sensor::geometry::time::DurNs;
 
 use crate::frame::{CanFrame, FRAME_BYTES};
 
-/// Supported carriers; each frame is a `can_frame` of 16 bytes.
+/// Supported carriers. Each frame is a `can_frame` of 16 bytes.
 pub const CARRIERS: [Carrier; 2] = [Carrier::Can, Carrier::Udp];
 
 const PATIENCE: DurNs = DurNs::from_millis(5_000);

@@ -1,4 +1,4 @@
-//! Unit side of the bus: the frames of one sample, at a fixed rate.
+//! Unit side of the bus. The emulator sends the frames of one sample at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::math;
@@ -12,7 +12,7 @@ use crate::sets::{bosch, j1939, sbg, xsens};
 /// Temperature of an emulated unit: 10 degrees Celsius.
 const SBG_TEMPERATURE: i16 = 1000;
 
-/// Ideal unit: no noise, bias or added delay, but whole counts.
+/// An ideal emulated unit: there is no noise, bias or added delay, but counts are whole numbers.
 #[derive(Debug, Clone)]
 pub struct ImuEmulator {
     meaning: DecoderSettings,
@@ -23,12 +23,12 @@ pub struct ImuEmulator {
 }
 
 impl ImuEmulator {
-    /// A unit that is switched on, and first samples, at `start`.
+    /// Creates a unit that is switched on, and first samples, at `start`.
     pub fn new(meaning: DecoderSettings, rate_hz: f64, start: MonoNs) -> Self {
         Self { meaning, rate_hz, start, begun: 0, told: 0 }
     }
 
-    /// Time from the start to a sample on the unit's clock.
+    /// Time of a sample on the unit's clock, counted from the start.
     fn elapsed(&self, sample: u64) -> DurNs {
         DurNs::from_secs_f64(sample as f64 / self.rate_hz)
     }
@@ -123,7 +123,7 @@ fn bosch(motion: &Inertia) -> [Option<Message>; 3] {
     .map(|message| message.map(Message::Bosch))
 }
 
-/// Returns the values if all are finite. Values that weren't measured aren't finite, and aren't sent.
+/// Returns the values if all are finite. A value that isn't finite wasn't measured, and is not sent.
 fn all_finite<const N: usize>(values: [f64; N]) -> Option<[f64; N]> {
     values.iter().all(|value| value.is_finite()).then_some(values)
 }
@@ -133,7 +133,7 @@ fn wrapped(ticks: i64) -> u32 {
     u32::try_from(ticks.rem_euclid(1 << 32)).unwrap_or_default()
 }
 
-/// Nearest counts in the wire's range.
+/// Nearest count within the wire's range.
 fn counts<const N: usize>(values: [f64; N], quantum: f64) -> Option<[i16; N]> {
     let counts = |value| {
         let counts = math::round_to_i64(value / quantum);

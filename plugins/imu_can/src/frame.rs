@@ -46,14 +46,14 @@ pub struct CanFrame {
     data: [u8; 8],
 }
 
-/// Reason why bytes are no frame.
+/// A reason why bytes are no frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// More data than a classic frame holds.
+    /// There is more data than a classic frame holds.
     #[error("reading a CAN frame: {0} data bytes; a classic frame has 0 to 8")]
     Length(usize),
-    /// An identifier with too many bits.
+    /// The identifier has too many bits.
     #[error(
         "reading a CAN frame: identifier {0:#X}; allowed are up to 0x7FF, or 0x1FFFFFFF for an extended one"
     )]
@@ -85,7 +85,7 @@ impl CanId {
 }
 
 impl Payload {
-    /// Appends bytes; those beyond eight are dropped.
+    /// Appends bytes. Bytes beyond eight are dropped.
     #[must_use]
     pub fn with(mut self, bytes: &[u8]) -> Self {
         for byte in bytes {
@@ -99,7 +99,7 @@ impl Payload {
 }
 
 impl CanFrame {
-    /// A data frame. Excess upper bits of the identifier are dropped.
+    /// Creates a data frame. Excess upper bits of the identifier are dropped.
     pub fn new(id: CanId, payload: Payload) -> Self {
         let id = match id {
             CanId::Standard(id) => CanId::Standard(id & STANDARD_IDS),
@@ -108,7 +108,7 @@ impl CanFrame {
         Self { kind: FrameKind::Data(id), len: payload.len, data: payload.data }
     }
 
-    /// A frame of any kind. A remote frame has a length but no data.
+    /// Creates a frame of any kind. A remote frame has a length but no data.
     ///
     /// Errors: more than eight bytes, or an identifier with too many bits.
     pub fn of_kind(kind: FrameKind, data: &[u8]) -> Result<Self, FrameError> {

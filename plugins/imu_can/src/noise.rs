@@ -1,4 +1,4 @@
-//! Noise of the units that presets are named after, from their makers' data sheets.
+//! Noise of the units after which the presets are named, from their makers' data sheets.
 
 use headrace_sensor::device::{BiasSpec, InertialNoise};
 
@@ -10,17 +10,19 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const DEGREE_AN_HOUR: f64 = DEGREE / 3600.0;
 /// A millionth of standard gravity, m/s^2.
 const MICRO_G: f64 = 9.806_65e-6;
-/// Time constant of bias wander, s: the usual minimum of an Allan deviation, at which data sheets state the in-run
-/// stability.
+/// Time constant of the bias wander, s. It is the usual time of the minimum of an Allan deviation, for which data
+/// sheets state the in-run stability.
 const WANDERS_OVER_S: f64 = 300.0;
-/// Constant bias after power-on of a factory-calibrated unit, rad/s. Data sheets bound it by the worst case of a year
-/// (0.2 degrees/s, 30 mm/s^2); a unit at rest on deck shows it.
+/// Constant bias of a factory-calibrated unit after power-on, rad/s.
+///
+/// The value is what a unit at rest on deck shows. Data sheets bound the bias by the worst case of a year (0.2
+/// degrees/s, 30 mm/s^2).
 const GYRO_TURN_ON: f64 = 0.05 * DEGREE;
 const ACCEL_TURN_ON_MPS2: f64 = 0.02;
-/// Increase of accelerometer in-run instability by mounting, temperature and resolution, m/s^2.
+/// In-run instability of accelerometers, increased for mounting, temperature and resolution, m/s^2.
 const ACCEL_IN_RUN_MPS2: f64 = 2e-3;
 
-/// Noise of the unit that a message set is named after; `None` if the set covers many units.
+/// Noise of the unit after which a message set is named; `None` if the set covers many units.
 pub(crate) fn of(set: MessageSet) -> Option<InertialNoise> {
     match set {
         // MT1603P: 0.007 degrees/s/sqrt(Hz), 8 degrees/h, 60 ug/sqrt(Hz). A resolution of 2^-9 rad/s at 100 Hz adds

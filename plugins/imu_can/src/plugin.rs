@@ -22,7 +22,7 @@ use crate::sets::{j1939, xsens};
 /// Name in vehicle files.
 pub const NAME: &str = "imu_can";
 
-/// Room for several seconds of four frames per sample at the usual rate.
+/// Buffer for several seconds of four frames per sample at the usual rate.
 const RING_BYTES: usize = 1 << 17;
 
 const USUAL_TICK_US: i64 = 100;

@@ -15,7 +15,7 @@ use crate::codec::{Message, MessageSet};
 use crate::decoder::{AxisOrder, DecoderSettings, ImuDecoder};
 use crate::sets::{bosch, j1939, sbg, xsens};
 
-/// A vehicle rotating at constant rates about its x axis and about the vertical.
+/// A vehicle that rotates at constant rates about its x axis and about the vertical.
 #[derive(Clone, Copy)]
 struct Going {
     roll_radps: f64,
@@ -38,7 +38,7 @@ impl Going {
         self.body(at) * sensor().mount.rotation
     }
 
-    /// Inertial measurement of the unit, which doesn't accelerate.
+    /// Inertial measurement of the vehicle's unit. The vehicle doesn't accelerate.
     fn felt(&self, inertia: Inertia) -> Inertia {
         let yaw = self.body(inertia.at).inverse() * Vec3::<Level>::new(0.0, 0.0, self.yaw_radps);
         let body = yaw + Vec3::new(self.roll_radps, 0.0, 0.0);
@@ -85,7 +85,7 @@ fn meaning(set: MessageSet) -> DecoderSettings {
 const XSENS: MessageSet = MessageSet::Xsens(xsens::Ids { base: None });
 const J1939: MessageSet = MessageSet::J1939(j1939::Network { source_address: None });
 
-/// Decodes messages, encoded as frames.
+/// Encodes messages as frames, and decodes these into readings.
 fn readings(decoder: &mut ImuDecoder, set: MessageSet, messages: &[Message]) -> Vec<Decoded> {
     let mut readings = Vec::new();
     for message in messages {
@@ -96,7 +96,7 @@ fn readings(decoder: &mut ImuDecoder, set: MessageSet, messages: &[Message]) -> 
     readings
 }
 
-/// Readings of `samples` samples of the emulated unit for `truth`.
+/// Readings from `samples` samples of the emulated unit, whose motion is `truth`.
 fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) -> Vec<Decoded> {
     let start = MonoNs(2_000_000_000);
     let setup = EmulatorSetup { start, head: None, site: Site::default(), polled: true };
@@ -120,7 +120,7 @@ fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) 
     readings
 }
 
-/// Compares every reading with the truth; tolerances are one quantum of rate and force.
+/// Compares every reading with the truth. The tolerances of rate and force are one quantum each.
 fn check(readings: &[Decoded], truth: &Going, rate_quantum: f64, force_quantum: f64) {
     for decoded in readings {
         let felt = truth.felt(Inertia::due(decoded.valid_at, DurNs::ZERO));
@@ -251,7 +251,8 @@ fn euler_angles_are_used_only_without_quaternions() {
 #[test]
 fn sbg_at_rest_has_upward_force_and_yaw_grows_to_the_left() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
-    // At rest the device's z axis, which points down, reads -9.81; a heading of -1.5 is nearly west, to the left of north.
+    // At rest the device's z axis, which points down, reads -9.81. A heading of -1.5 rad is nearly west, to the left of
+    // north.
     let messages = [sbg::Message::Acceleration([0, 0, -981]), sbg::Message::Euler([0, 1000, -15_000])];
     let got = readings(&mut decoder, MessageSet::Sbg, &messages.map(Message::Sbg));
     let Reading::SpecificForce(force) = got[0].reading else { panic!() };
@@ -276,7 +277,7 @@ fn invalid_j1939_values_are_withheld_and_latency_is_subtracted() {
     assert_eq!((got.len(), decoder.withheld()), (2, 2));
     assert_eq!(got[0].valid_at, MonoNs(1_000_000_000 - 3_000_000 - 2_500_000));
     assert_eq!(got[1].valid_at, MonoNs(1_000_000_000 - 3_000_000));
-    // The first rate is pitch, about y.
+    // The first rate on the wire is pitch, about y.
     let Reading::AngularRate(rate) = got[1].reading else { panic!() };
     assert_eq!(rate, Vec3::new(0.0, 1.0_f64.to_radians(), 0.0));
 }
@@ -313,7 +314,8 @@ fn sbg_values_with_bad_status_are_withheld() {
     let info = |status| sbg::Message::ImuInfo { time_us: 0, status: sbg::ImuStatus(status), temperature: 0 };
     let samples = [sbg::Message::Acceleration([0; 3]), sbg::Message::Rate([0; 3])];
     assert_eq!(readings(&mut decoder, MessageSet::Sbg, &samples.map(Message::Sbg)).len(), 2);
-    // Accelerometer bits, gyro bits and the response bit; the overall test bit is their combination and isn't checked.
+    // The checked bits are the accelerometer bits, the gyro bits and the response bit. The overall test bit combines
+    // others and isn't checked.
     for (bit, expected) in [(0, 0), (1, 2), (2, 1), (4, 1), (5, 1), (7, 1), (8, 1), (9, 1), (10, 2)] {
         let messages = [info(0x3FF & !(1 << bit)), samples[0], samples[1]].map(Message::Sbg);
         assert_eq!(readings(&mut decoder, MessageSet::Sbg, &messages).len(), expected, "bit {bit}");

@@ -1,4 +1,4 @@
-//! Decodes frames into readings of one part of the vehicle; other good frames are ignored.
+//! Decodes frames into readings of one part of the vehicle. Other good frames are ignored.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_sensor::device::Decoder;
@@ -16,21 +16,21 @@ use crate::message::{
     to_ours,
 };
 
-/// Longest usual gap within a frame: the longest takes 50 ms at 57,600 baud.
+/// Longest usual gap within a frame. The longest frame takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
-/// Tolerance of angle limits, for rounding.
+/// Tolerance of angle limits, which allows for rounding.
 const ANGLE_TOLERANCE_RAD: f64 = 1e-3;
 
-/// Quality that marks a distance as invalid.
+/// Quality value that marks a distance as invalid, per cent.
 const QUALITY_INVALID_PERCENT: u8 = 1;
 
 /// Decoding settings of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecoderSettings {
-    /// Part of the vehicle.
+    /// Decoded part of the vehicle.
     pub part: Part,
-    /// Accepted system id; `None` for that of the first autopilot received.
+    /// Accepted system id; `None` for the system id of the first autopilot received.
     pub system_id: Option<u8>,
     /// Accepted component id; `None` for any.
     pub component_id: Option<u8>,
@@ -43,14 +43,14 @@ pub struct DecoderSettings {
 pub enum Part {
     /// Attitude, turn rate, specific force.
     Imu {
-        /// Source of rates and forces; `None` for the rates of ATTITUDE, without forces.
+        /// Message with rates and forces. With `None`, the rates come from ATTITUDE, and there are no forces.
         message: Option<ImuMessage>,
     },
     /// Water pressure.
     Pressure {
-        /// Barometer, by message.
+        /// Message of the barometer.
         message: PressureMessage,
-        /// Resolution of the sensor behind it, Pa.
+        /// Resolution of the barometer's sensor, Pa.
         resolution_pa: f64,
     },
     /// A distance.
@@ -64,7 +64,7 @@ pub struct DistancePart {
     pub orientation: Option<u8>,
     /// Sensor id; `None` for any.
     pub sensor_id: Option<u8>,
-    /// Confidence, 0 to 1, of a distance of unknown quality.
+    /// Confidence, 0 to 1, of a distance whose quality is unknown.
     pub unknown_confidence: f64,
     /// Speed of sound setting of the sensor, m/s.
     pub sound_speed_mps: f64,
@@ -92,7 +92,7 @@ struct State {
 
 stateful!(State { state: boot, system_id, passed_over, withheld; fixed: meaning; });
 
-/// The autopilot's 32-bit millisecond clock, unwrapped.
+/// The autopilot's 32-bit millisecond clock, without wraps.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct BootClock {
     last_ms: Option<u32>,
@@ -100,7 +100,7 @@ struct BootClock {
 }
 
 impl BootClock {
-    /// Processes a timestamp. Small backward steps are real and no wraps, because messages may be sent out of order.
+    /// Processes a timestamp. A small backward step is no wrap, since messages may be sent out of order.
     fn note(&mut self, time_ms: u32) {
         self.since_boot_ms = match self.last_ms {
             None => i64::from(time_ms),
@@ -111,14 +111,14 @@ impl BootClock {
 }
 
 impl MavlinkDecoder {
-    /// New decoder.
+    /// Creates a decoder.
     pub fn new(meaning: DecoderSettings) -> Self {
         let system_id = meaning.system_id;
         let state = State { meaning, boot: BootClock::default(), system_id, passed_over: 0, withheld: 0 };
         Self { codec: MavlinkCodec::default(), clock: LineClock::new(SILENCE), state }
     }
 
-    /// Number of good frames not of this part.
+    /// Number of good frames that don't belong to this part.
     pub fn passed_over(&self) -> u64 {
         self.state.passed_over
     }
@@ -145,8 +145,8 @@ impl Decoder for MavlinkDecoder {
 
     /// Number of withheld messages of the part.
     ///
-    /// These are messages from other systems, and invalid values: angles beyond their range, non-finite numbers,
-    /// pressure not above zero, contradictory limits.
+    /// Messages are withheld if they are from another system or have invalid values: angles beyond their range,
+    /// non-finite numbers, a pressure not above zero, contradictory limits.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -163,13 +163,14 @@ impl State {
         } else {
             self.passed_over += 1;
         }
-        // The driver delivers messages of one system only; in a foreign log the heartbeat may be missing.
+        // In headrace's own logs all messages are from one system. Other logs may lack a heartbeat, so the part's first
+        // message also decides.
         if is_ours && (is_autopilots_heartbeat(frame) || self.passed_over == before) {
             self.system_id = Some(system_of(frame));
         }
     }
 
-    /// Whether a frame belongs to this part, from any sender.
+    /// Whether a frame belongs to this part, whatever its sender.
     fn is_of_part(&self, frame: &Frame) -> bool {
         let mut same = Self { system_id: None, passed_over: 0, ..self.clone() };
         same.take_own(frame, &mut |_| ());
@@ -217,7 +218,7 @@ impl State {
     }
 }
 
-/// Intrinsic z-y-x rotation equals extrinsic x-y-z, which [`Rot`] takes.
+/// An intrinsic z-y-x rotation equals an extrinsic x-y-z rotation, which [`Rot`] takes.
 fn attitude(attitude: &ATTITUDE_DATA) -> Option<Reading> {
     let [roll, pitch, yaw] = to_ours([attitude.roll, attitude.pitch, attitude.yaw].map(f64::from));
     let within = |angle: f64, most: f64| angle.abs() <= most + ANGLE_TOLERANCE_RAD;
@@ -249,7 +250,8 @@ impl DistancePart {
             && self.sensor_id.is_none_or(|id| id == distance.sensor_id)
     }
 
-    /// A distance marked invalid, or outside the sensor's limits, gives a ping without an echo.
+    /// Converts a distance to a reading. A distance marked invalid, or outside the sensor's limits, gives a ping
+    /// without an echo.
     fn echo(&self, distance: &Distance) -> Option<Reading> {
         if distance.least_cm >= distance.most_cm || distance.quality_percent > 100 {
             return None;

@@ -1,4 +1,4 @@
-//! Host side of a telemetry link: receives its part's messages and sends heartbeats.
+//! Host side of a telemetry link. The driver receives its part's messages and sends heartbeats.
 
 use headrace_sensor::codec::Framing as _;
 use headrace_sensor::device::Decoder as _;
@@ -15,31 +15,32 @@ use crate::frame::{Frames, MAX_FRAME_BYTES, encode, is_autopilots_heartbeat, sys
 /// Supported carriers.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial];
 
-/// Longest usual gap within a frame: the longest takes 50 ms at 57,600 baud.
+/// Longest usual gap within a frame. The longest frame takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
-/// Routers send only to active systems. Source: MAVLink, heartbeat protocol, once a second.
+/// Period of the heartbeats, without which routers send nothing. Source: MAVLink, heartbeat protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
-/// The host is an onboard computer of the vehicle.
+/// Component id of the host, an onboard computer of the vehicle.
 const COMPONENT_ID: u8 = MavComponent::MAV_COMP_ID_ONBOARD_COMPUTER as u8;
 const SYSTEM_ID: u8 = 1;
 
-/// Driver of a part. It delivers only messages of its part, so that each message on a shared line is recorded once.
+/// Driver of a part. The driver delivers only messages of its part, so that each message on a shared line is recorded
+/// once.
 ///
-/// Messages of other systems are dropped, and so are all messages before the accepted system is known.
+/// The driver drops messages of other systems. It also drops all messages until the accepted system is known.
 pub struct MavlinkDriver {
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
-    /// Separates the part's messages from others.
+    /// Decides which messages belong to the part.
     decoder: MavlinkDecoder,
     own_frames: u64,
     next_at: MonoNs,
     sequence: u8,
-    /// Accepted system: the configured one, or that of the first autopilot's heartbeat.
+    /// Accepted system id: the configured one, or that of the first autopilot's heartbeat.
     system_id: Option<u8>,
     strangers: IgnoredSenders,
 }
 
 impl MavlinkDriver {
-    /// Driver of a part of the vehicle.
+    /// Creates the driver of a part.
     pub fn new(meaning: DecoderSettings) -> Self {
         Self {
             cutter: Cutter::new(Frames, SILENCE),

@@ -1,4 +1,4 @@
-//! Autopilot side of the line: the messages of one part, at a fixed rate.
+//! Autopilot side of the line. The emulator sends the messages of one part at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_sensor::geometry::math;
@@ -12,39 +12,39 @@ use crate::dialect::{ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavModeFlag, M
 use crate::frame::encode;
 use crate::message::{Distance, HECTOPASCAL, Imu, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, to_ours};
 
-/// Limits of an emulated distance sensor, cm: about those of a Ping1D.
+/// Limits of an emulated distance sensor, cm. They are about those of a Ping1D.
 const LEAST_CM: u16 = 30;
 const MOST_CM: u16 = 5000;
-/// Qualities with and without an echo.
+/// Qualities of distances with and without an echo, per cent.
 const QUALITY_HEARD_PERCENT: u8 = 100;
 const QUALITY_INVALID_PERCENT: u8 = 1;
-/// Source: MAVLink, heartbeat protocol, once a second.
+/// Period of heartbeats. Source: MAVLink, heartbeat protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
-/// Ten degrees Celsius.
+/// Temperature of the emulated sensors: ten degrees Celsius, in hundredths.
 const TEMPERATURE_CDEGC: i16 = 1000;
 
-/// Ideal autopilot: no noise and no added delay, but whole wire units.
+/// An ideal emulated autopilot: there is no noise and no added delay, but values are whole wire units.
 #[derive(Debug, Clone)]
 pub struct AutopilotEmulator {
     meaning: DecoderSettings,
     rate_hz: f64,
     start: MonoNs,
-    /// Metres measured by the distance sensor per true metre at the site.
+    /// Ratio of a distance as measured by the sensor to the true distance at the site.
     device_per_site: f64,
     begun: u64,
     sequence: u8,
-    /// Time of the next heartbeat; `None` without a host that receives them.
+    /// Time of the next heartbeat; `None` if no host receives heartbeats.
     heartbeat_at: Option<MonoNs>,
 }
 
 impl AutopilotEmulator {
-    /// An autopilot that is switched on, and first sends, at the setup's start.
+    /// Creates an autopilot that is switched on, and first sends, at the setup's start.
     pub fn new(meaning: DecoderSettings, rate_hz: f64, setup: &EmulatorSetup) -> Self {
         let device_per_site = match meaning.part {
             Part::Distance(part) => part.sound_speed_mps / setup.site.sound_speed_mps,
             _ => 1.0,
         };
-        // A log has no heartbeats, because a part's driver records its own messages only.
+        // Without a real host there are no heartbeats, since a part's driver records only its own messages.
         let heartbeat_at = (!setup.polled).then_some(setup.start);
         Self { meaning, rate_hz, start: setup.start, device_per_site, begun: 0, sequence: 0, heartbeat_at }
     }
@@ -100,7 +100,7 @@ impl Emulator<Inertia> for AutopilotEmulator {
         let rates_radps = to_ours(motion.rate_radps.0.into());
         let [rollspeed, pitchspeed, yawspeed] = rates_radps.map(single);
         let time_boot_ms = self.since_boot_ms(motion.at);
-        // Values that weren't measured aren't finite, and aren't sent.
+        // A value that isn't finite wasn't measured, and is not sent.
         let is_known = |values: &[f64]| values.iter().all(|value| value.is_finite());
         if !is_known(&rates_radps) {
             return;
@@ -162,7 +162,7 @@ impl Emulator<Sounding> for AutopilotEmulator {
     }
 }
 
-/// The heartbeat of an ArduSub.
+/// The heartbeat of a vehicle with ArduSub.
 fn heartbeat(header: MavHeader) -> MAVLinkV2MessageRaw {
     let heartbeat = HEARTBEAT_DATA {
         mavtype: MavType::MAV_TYPE_SUBMARINE,
@@ -174,7 +174,7 @@ fn heartbeat(header: MavHeader) -> MAVLinkV2MessageRaw {
     encode(header, &heartbeat)
 }
 
-/// Nearest value in the wire's range.
+/// Nearest value within the wire's range.
 fn counts(value: f64) -> i16 {
     let counts = math::round_to_i64(value);
     i16::try_from(counts).unwrap_or(if counts < 0 { i16::MIN } else { i16::MAX })

@@ -32,9 +32,9 @@ pub struct Frame {
     pub version: MavlinkVersion,
     /// Sender and sequence number.
     pub header: MavHeader,
-    /// Message id; up to 24 bits, 8 in version 1.
+    /// Message id: up to 24 bits, or 8 bits in version 1.
     pub message_id: u32,
-    /// Message fields, as far as they were sent.
+    /// Message fields, without truncated zeros.
     pub payload: Bytes<MAX_PAYLOAD_LEN>,
 }
 
@@ -49,7 +49,7 @@ struct Header {
 }
 
 impl Header {
-    /// The header at the front of `front`; `None` if incomplete.
+    /// Decodes the header at the front of `front`; `None` if the header is incomplete.
     fn of(front: &[u8]) -> Option<Self> {
         let (version, payload_bytes, signed, [sequence, system_id, component_id], message_id) = match *front {
             [MAV_STX, len, n, system, component, id, ..] => {
@@ -66,7 +66,7 @@ impl Header {
         Some(Self { version, payload_bytes: usize::from(payload_bytes), signed, sender, message_id })
     }
 
-    /// Offset of the payload.
+    /// Start of the payload in the frame.
     fn header_bytes(&self) -> usize {
         match self.version {
             MavlinkVersion::V1 => V1_HEADER_BYTES,
@@ -74,7 +74,7 @@ impl Header {
         }
     }
 
-    /// End of the payload.
+    /// End of the payload in the frame.
     fn summed_bytes(&self) -> usize {
         self.header_bytes() + self.payload_bytes
     }
@@ -83,7 +83,7 @@ impl Header {
         self.summed_bytes() + CHECKSUM_SIZE + if self.signed { v2::SIGNATURE_SIZE } else { 0 }
     }
 
-    /// True if the message's checksum can be checked; version 1 also requires the message's exact length.
+    /// Whether the message's checksum can be checked. In version 1 the length must also be exactly the message's.
     fn is_known(&self) -> bool {
         match self.version {
             MavlinkVersion::V1 => v1_payload_bytes(self.message_id) == Some(self.payload_bytes),
@@ -92,7 +92,7 @@ impl Header {
     }
 }
 
-/// Payload length of a message in version 1: all fields except extensions.
+/// Payload length of a message in version 1, which has all fields except extensions.
 fn v1_payload_bytes(message_id: u32) -> Option<usize> {
     let message = MavMessage::default_message_from_id(message_id)?;
     Some(message.ser(MavlinkVersion::V1, &mut [0; MAX_PAYLOAD_LEN]))
@@ -110,7 +110,7 @@ pub(crate) fn system_of(frame: &Frame) -> u8 {
     u8::try_from(frame.header.system_id).unwrap_or(u8::MAX)
 }
 
-/// True for the heartbeat of an autopilot: not of a ground station, a router or another onboard computer.
+/// Whether a frame is the heartbeat of an autopilot, and not of a ground station, a router or another onboard computer.
 /// Source: MAVLink, HEARTBEAT (custom mode of four bytes, then type and autopilot).
 pub(crate) fn is_autopilots_heartbeat(frame: &Frame) -> bool {
     let [kind, autopilot] = match *frame.payload.as_slice() {
@@ -123,15 +123,15 @@ pub(crate) fn is_autopilots_heartbeat(frame: &Frame) -> bool {
         && autopilot != dialect::MavAutopilot::MAV_AUTOPILOT_INVALID as u8
 }
 
-/// Length of the frame at the front of `front` by its header; `None` if the header is incomplete.
+/// Length that the header at the front of `front` states for its frame; `None` if the header is incomplete.
 pub(crate) fn announced_bytes(front: &[u8]) -> Option<usize> {
     Header::of(front).map(|header| header.whole_bytes())
 }
 
-/// Framing in a byte stream.
+/// Separates frames in a byte stream.
 ///
 /// A frame with an unknown message, or with an incompatibility flag other than signing, can't be distinguished from
-/// noise, and its bytes are skipped.
+/// noise. Its bytes are skipped.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Frames;
 
@@ -171,7 +171,7 @@ impl Framing for Frames {
     }
 }
 
-/// Messages with geographic position, hardware identity or free text; none of them is decoded here.
+/// Messages with geographic position, hardware identity or free text. This crate decodes none of them.
 #[expect(deprecated, reason = "older autopilots send superseded messages")]
 const IDENTITY: [u32; 16] = [
     dialect::GPS_RAW_INT_DATA::ID,
@@ -192,8 +192,9 @@ const IDENTITY: [u32; 16] = [
     dialect::OPEN_DRONE_ID_BASIC_ID_DATA::ID,
 ];
 
-/// Writes a packet of whole frames without those of [`IDENTITY`]; `None` if there are none of those, or anything but
-/// frames.
+/// Copies a packet of whole frames to `shorter`, without the messages in [`IDENTITY`].
+///
+/// `None` if the packet has none of these messages, or has anything except whole frames.
 pub(crate) fn without_identity(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     let mut rest = packet;
     while !rest.is_empty() {
@@ -241,7 +242,7 @@ mod tests {
         [&bytes[..], &sum.to_le_bytes(), &signature].concat()
     }
 
-    /// RAW_IMU of version 1, all fields zero but the first.
+    /// RAW_IMU in version 1. All fields are zero except the first.
     fn first_version() -> Frame {
         let mut payload = [0; 26];
         payload[0] = 0xFD;
@@ -327,7 +328,7 @@ mod tests {
         assert_eq!(decode_all(&mut MavlinkCodec::default(), &encoded(&frame)), []);
     }
 
-    /// Frames without signatures: a truncated signature can't be distinguished from the following frame.
+    /// The frames have no signatures, since a truncated signature can't be distinguished from the following frame.
     fn any_frame() -> impl Strategy<Value = Frame> {
         let ids = proptest::sample::select(vec![0_u32, 26, 27, 29, 30, 116, 132, 137, 143, 253, 11_032]);
         let payload = proptest::collection::vec(any::<u8>(), 255);

@@ -17,7 +17,7 @@ pub mod plugin;
 pub mod tlog;
 
 pub use mavlink::MavHeader;
-/// ArduPilot's dialect: its own messages and all included ones.
+/// ArduPilot's dialect: its own messages and all messages that it includes.
 pub use mavlink::dialects::ardupilotmega as dialect;
 pub use plugin::MavlinkKind;
 

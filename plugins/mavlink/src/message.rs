@@ -1,6 +1,6 @@
 //! Supported messages, in wire units and axes: x forward, y right, z down, and north, east, down.
 //!
-//! [`to_ours`] converts vectors and angles to our axes (x forward, y left, z up); it is its own inverse.
+//! [`to_ours`] converts vectors and angles to headrace's axes (x forward, y left, z up), and back.
 //! Source: MAVLink common message set (common.xml): ATTITUDE, RAW_IMU, SCALED_IMU to SCALED_IMU3, SCALED_PRESSURE to
 //! SCALED_PRESSURE3, DISTANCE_SENSOR.
 
@@ -27,9 +27,9 @@ pub enum Message {
     Attitude(ATTITUDE_DATA),
     /// Rates and forces of one inertial unit.
     Imu(Imu),
-    /// Pressure of one barometer.
+    /// Pressure measured by one barometer.
     Pressure(Pressure),
-    /// One distance.
+    /// One measured distance.
     Distance(Distance),
 }
 
@@ -38,13 +38,13 @@ pub enum Message {
 pub struct Imu {
     /// Message type.
     pub message: ImuMessage,
-    /// Time since boot, or since 1970; SCALED_IMU messages send it in milliseconds.
+    /// Time since boot, or since 1970. The SCALED_IMU messages have it in milliseconds.
     pub time_us: u64,
     /// Specific force, milli-g.
     pub force_mg: [i16; 3],
     /// Turn rate, mrad/s.
     pub rate_mradps: [i16; 3],
-    /// Unit number; above 0 only in RAW_IMU of version 2.
+    /// Unit number. It is above 0 only in RAW_IMU of version 2.
     pub unit: u8,
 }
 
@@ -76,7 +76,7 @@ pub struct Distance {
     pub sensor_id: u8,
     /// Viewing direction, as a MAV_SENSOR_ORIENTATION number.
     pub orientation: u8,
-    /// Quality in per cent; 1 = invalid, 0 = unknown.
+    /// Quality in per cent. 1 means invalid, 0 unknown.
     pub quality_percent: u8,
 }
 
@@ -104,7 +104,7 @@ pub enum PressureMessage {
     Third,
 }
 
-/// Converts a vector, or roll, pitch and yaw, from the wire's axes to ours, or back.
+/// Converts a vector, or roll, pitch and yaw, from the wire's axes to headrace's, or back.
 pub fn to_ours([x, y, z]: [f64; 3]) -> [f64; 3] {
     [x, -y, -z]
 }
@@ -126,7 +126,7 @@ impl Message {
         }
     }
 
-    /// Encodes the message as a version 2 frame. Fields not decoded here are zero.
+    /// Encodes the message as a version 2 frame. Fields that aren't decoded here are zero.
     pub fn to_frame(&self, header: MavHeader) -> MAVLinkV2MessageRaw {
         match self {
             Self::Attitude(attitude) => encode(header, attitude),
@@ -146,12 +146,12 @@ impl Message {
     }
 }
 
-/// Fields of a frame; fields not sent are zero.
+/// Decodes the fields of a frame. Fields that weren't sent are zero.
 fn read<D: MessageData, T: From<D>>(frame: &Frame) -> Option<T> {
     D::deser(frame.version, frame.payload.as_slice()).ok().map(T::from)
 }
 
-/// The IMU messages share their fields, except for times and RAW_IMU's unit number.
+/// The IMU messages have the same fields, except for the times and RAW_IMU's unit number.
 macro_rules! imu_messages {
     ($($data:ident: $message:ident, $time:ident: $time_type:ty = $unit_us:literal us $(, $unit:ident)?;)*) => {$(
         impl From<$data> for Imu {
@@ -184,7 +184,7 @@ imu_messages! {
     SCALED_IMU3_DATA: Scaled3, time_boot_ms: u32 = 1000 us;
 }
 
-/// The pressure messages share their fields.
+/// The pressure messages have the same fields.
 macro_rules! pressure_messages {
     ($($data:ident: $message:ident;)*) => {$(
         impl From<$data> for Pressure {
@@ -213,12 +213,12 @@ pressure_messages! {
     SCALED_PRESSURE3_DATA: Third;
 }
 
-/// Payload offsets of a distance's type and orientation.
+/// Payload offsets of a distance's sensor type and orientation.
 const TYPE_AT: usize = 10;
 const ORIENTATION_AT: usize = 12;
 
-/// The crate rejects types and orientations missing from its definitions. Neither is parsed as an enumeration here:
-/// the sensor type isn't used, and the orientation is a plain number in the vehicle file.
+/// The crate rejects types and orientations that its definitions lack. Here neither is parsed as an enumeration: the
+/// sensor type isn't used, and the orientation is a plain number in the vehicle file.
 impl MessageData for Distance {
     type Message = MavMessage;
 
@@ -239,7 +239,7 @@ impl MessageData for Distance {
             signal_quality: self.quality_percent,
             ..DISTANCE_SENSOR_DATA::DEFAULT
         };
-        // The following field, the unknown variance, isn't zero, so the orientation is never truncated.
+        // The field after the orientation, the unknown variance, isn't zero, so the orientation is never truncated.
         let len = data.ser(version, payload);
         if let Some(orientation) = payload.get_mut(ORIENTATION_AT) {
             *orientation = self.orientation;
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn recorded_messages_match_another_reader() {
+    fn recorded_messages_match_an_independent_parser() {
         let Message::Attitude(attitude) = recorded(RECORDED_ATTITUDE) else { panic!() };
         assert_eq!(attitude.time_boot_ms, 689_235);
         let near = |got: f32, wanted: f32| assert!((got - wanted).abs() < 1e-6, "{got} is not {wanted}");

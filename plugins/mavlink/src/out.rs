@@ -1,8 +1,8 @@
-//! The program's own MAVLink messages, sent as an onboard computer beside the autopilot: heartbeats, values and
-//! texts.
+//! The program's own MAVLink messages: heartbeats, values and texts. The program sends them as an onboard computer
+//! beside the autopilot.
 //!
-//! DISTANCE_SENSOR and OBSTACLE_DISTANCE are never sent. Ground stations would attribute them to the autopilot, and
-//! an autopilot would try to avoid them.
+//! DISTANCE_SENSOR and OBSTACLE_DISTANCE are never sent. Ground stations would attribute them to the autopilot, and an
+//! autopilot would try to avoid the obstacles.
 
 use mavlink::MavHeader;
 use mavlink::types::CharArray;
@@ -15,24 +15,24 @@ use crate::frame::encode;
 
 /// MAV_COMP_ID_ONBOARD_COMPUTER. Source: MAVLink, MAV_COMPONENT.
 pub const COMPONENT_ID: u8 = 191;
-/// Longest text of a STATUSTEXT; longer ones are sent in parts. Source: MAVLink, STATUSTEXT.
+/// Longest text of a STATUSTEXT. Longer texts are sent in parts. Source: MAVLink, STATUSTEXT.
 pub const TEXT_BYTES: usize = 50;
 /// Longest name of a value. Source: MAVLink, NAMED_VALUE_FLOAT.
 pub const NAME_BYTES: usize = 10;
-/// Names that QGroundControl attributes to the autopilot from any sender. Source: its ArduSub plugin, August 2026.
+/// Names that QGroundControl attributes to the autopilot, whoever sends them. Source: its ArduSub plugin, August 2026.
 pub const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
 /// Severity of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gravity {
-    /// Act at once.
+    /// Act immediately.
     Emergency,
     /// Act.
     Alarm,
-    /// Take care.
+    /// Be careful.
     Warning,
-    /// Be informed.
+    /// Take note.
     Caution,
 }
 
@@ -47,7 +47,7 @@ impl From<Gravity> for MavSeverity {
     }
 }
 
-/// Encodes messages, in order.
+/// Encodes messages in the order in which they are sent.
 #[derive(Debug)]
 pub struct Speaker {
     system_id: u8,
@@ -57,12 +57,12 @@ pub struct Speaker {
 }
 
 impl Speaker {
-    /// A part of the vehicle with this system id.
+    /// Creates an encoder for a component of the system with this id.
     pub fn new(system_id: u8) -> Self {
         Self { system_id, sequence: 0, text: 0 }
     }
 
-    /// A heartbeat.
+    /// Encodes a heartbeat.
     pub fn heartbeat(&mut self, is_active: bool) -> Vec<u8> {
         let header = self.header();
         let system_status = if is_active { MavState::MAV_STATE_ACTIVE } else { MavState::MAV_STATE_STANDBY };
@@ -76,7 +76,7 @@ impl Speaker {
         encode(header, &heartbeat).raw_bytes().to_vec()
     }
 
-    /// Encodes a named value; NaN if unknown. `None` for a name that is too long or [`RESERVED`].
+    /// Encodes a named value; NaN means unknown. `None` if the name is too long, not ASCII, or [`RESERVED`].
     pub fn figure(&mut self, name: &str, time_ms: u32, value: f32) -> Option<Vec<u8>> {
         if name.len() > NAME_BYTES || !name.is_ascii() || RESERVED.contains(&name) {
             return None;
@@ -92,7 +92,7 @@ impl Speaker {
         let text = ascii(text);
         let is_whole = text.len() <= TEXT_BYTES;
         let id = if is_whole { 0 } else { self.next_text() };
-        // A full part doesn't state that it is the last, so an empty one follows it.
+        // A full part can't be marked as the last part, so an empty part follows it.
         let parts = if is_whole { 1 } else { text.len() / TEXT_BYTES + 1 };
         let part = |part: usize| {
             let from = part * TEXT_BYTES;
@@ -105,7 +105,7 @@ impl Speaker {
                 severity: gravity.into(),
                 text: CharArray::from(part),
                 id,
-                // Parts have 50 bytes; no text of this program needs 255 parts.
+                // A part has 50 bytes, and no text of this program needs 255 parts.
                 chunk_seq: u8::try_from(number).unwrap_or(u8::MAX),
             };
             frames.push(encode(header, &said).raw_bytes().to_vec());
@@ -119,7 +119,7 @@ impl Speaker {
         MavHeader { system_id: u32::from(self.system_id), component_id: COMPONENT_ID, sequence }
     }
 
-    /// Number of the next text. Zero is reserved for texts of one part.
+    /// Number of the next text that is sent in parts. Zero is reserved for texts of one part.
     fn next_text(&mut self) -> u16 {
         self.text = self.text.checked_add(1).unwrap_or(1);
         self.text
@@ -144,7 +144,7 @@ fn ascii(text: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Header and payload by the guide's "Packet Serialization", with the zeros that the sender truncated.
+    /// Header and payload as in the guide's "Packet Serialization", with the zeros that the sender truncated.
     fn parts(frame: &[u8]) -> ([u8; 3], u32, Vec<u8>) {
         assert_eq!((frame[0], frame[2]), (0xfd, 0));
         let length = usize::from(frame[1]);
@@ -173,7 +173,7 @@ mod tests {
         let mut speaker = Speaker::new(7);
         let (header, id, payload) = parts(&speaker.heartbeat(true));
         assert_eq!((header, id), ([0, 7, 191], 0));
-        // Custom mode, type, autopilot, base mode, state, version.
+        // Fields: custom mode, type, autopilot, base mode, state, version.
         assert_eq!(&payload[..9], [0, 0, 0, 0, 18, 8, 0, 4, 3]);
         assert_eq!(parts(&speaker.heartbeat(false)).0, [1, 7, 191]);
     }
@@ -201,7 +201,7 @@ mod tests {
             assert_eq!(said, text);
             assert!(chunks.iter().enumerate().all(|(number, chunk)| usize::from(*chunk) == number));
             assert!(ids.iter().all(|id| *id == ids[0] && (*id == 0) == (length <= 50)), "{ids:?}");
-            // The last part has a zero.
+            // The text of the last part ends with a zero.
             let (_, _, last) = parts(frames.last().unwrap());
             assert!(length <= 50 || last[1..51].contains(&0));
         }

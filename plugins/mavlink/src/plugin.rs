@@ -16,10 +16,10 @@ use crate::message::{ImuMessage, PressureMessage};
 /// Name in vehicle files.
 pub const NAME: &str = "mavlink";
 
-/// Room for several seconds of an autopilot's full output.
+/// Buffer for several seconds of an autopilot's full output.
 const RING_BYTES: usize = 1 << 17;
 
-/// Resolution of ArduSub's pressures for a Bar30, Pa.
+/// Resolution of the pressures that ArduSub sends for a Bar30, Pa.
 const USUAL_RESOLUTION_PA: f64 = 10.0;
 
 /// The MAVLink device kind: parts reported by an autopilot.

@@ -20,7 +20,7 @@ use crate::frame::{encode, without_identity};
 use crate::message::{Distance, ImuMessage, Message, Pressure as Told, PressureMessage};
 use crate::{MavHeader, MavlinkKind};
 
-/// ATTITUDE, RAW_IMU and SCALED_PRESSURE2 of an ArduSub, from a telemetry log.
+/// Recorded ATTITUDE, RAW_IMU and SCALED_PRESSURE2 messages of an ArduSub, from a telemetry log.
 pub(crate) const RECORDED_ATTITUDE: &[u8] = &[
     0xFD, 0x1C, 0x00, 0x00, 0xEC, 0x01, 0x01, 0x1E, 0x00, 0x00, 0x53, 0x84, 0x0A, 0x00, 0x9C, 0x11, 0xC7,
     0xBC, 0x2B, 0x3E, 0xCA, 0x3C, 0xA0, 0x45, 0x16, 0xC0, 0x16, 0x73, 0xBF, 0xBC, 0x59, 0x0E, 0x30, 0x3C,
@@ -75,7 +75,7 @@ fn decode_message(decoder: &mut MavlinkDecoder, message: &Message) -> Vec<Readin
     readings.into_iter().map(|decoded| decoded.reading).collect()
 }
 
-/// Readings of the emulated part for measurements filled in by `feel`.
+/// Readings of the emulated part. `feel` fills in the measurements.
 fn emulated<M: Measurement>(
     emulator: &mut dyn Emulator<M>,
     decoder: &mut MavlinkDecoder,
@@ -108,7 +108,7 @@ fn setup() -> EmulatorSetup {
     }
 }
 
-/// A vehicle that yaws to the left, nose down and heeling, without acceleration.
+/// Motion of a vehicle that yaws to the left, nose down and heeling, without acceleration.
 fn felt(inertia: Inertia) -> Inertia {
     let t = inertia.at.since(START).as_secs_f64();
     let attitude: Rot<Level, Sensor> = Rot::from_roll_pitch_yaw(0.1, 0.3, 0.5 + 0.2 * t);
@@ -133,7 +133,7 @@ fn attitude_rates_and_forces_round_trip() {
         let mut decoder = decoder(part);
         let readings = emulated(emulator.as_mut(), &mut decoder, 50, felt);
         assert_eq!(readings.len(), 50 * each);
-        // Tolerances: two quanta of rate and force, and single precision of angles.
+        // The tolerances are two quanta for rate and force, and single precision for angles.
         for decoded in &readings {
             let truth = felt(Inertia::due(decoded.valid_at, DurNs::ZERO));
             match decoded.reading {
@@ -174,7 +174,7 @@ fn pressures_round_trip_to_half_a_quantum() {
 }
 
 #[test]
-fn distances_round_trip_and_no_echo_gives_none() {
+fn distances_round_trip_and_a_missing_echo_gives_no_distance() {
     let own = "part = \"distance\"\norientation = 25\nsensor_id = 3\nsound_speed_mps = 1500\n";
     let device = configured(own).unwrap();
     assert_eq!(device.sense(), Sense::Echosounder);
@@ -216,7 +216,7 @@ fn wire_axes_are_converted() {
     let Reading::Attitude(attitude) = readings[0] else { panic!() };
     let (roll, pitch, yaw) = attitude.roll_pitch_yaw();
     assert!((roll - 0.1).abs() < 1e-7 && (pitch + 0.2).abs() < 1e-7 && (yaw + 0.3).abs() < 1e-7);
-    // Nose up on the wire is nose up in our axes: the body's x axis rises.
+    // Nose up on the wire is nose up in headrace's axes: the body's x axis rises.
     let nose = attitude * Vec3::new(1.0, 0.0, 0.0);
     assert!((nose.z() - 0.198_669).abs() < 1e-6, "{nose:?}");
     assert_eq!(readings[1], Reading::AngularRate(Vec3::new(1.0, -2.0, -3.0)));
@@ -313,7 +313,7 @@ fn wrong_keys_are_named() {
 
 #[test]
 fn anonymising_removes_positions_and_ids_and_keeps_readings() {
-    // GLOBAL_POSITION_INT of both versions, version 2 signed.
+    // The removed messages are GLOBAL_POSITION_INT in both versions; the one in version 2 is signed.
     let first = [&[0xFE, 28, 0, 1, 1, 33][..], &[7; 28], &[0, 0]].concat();
     let second = [&[0xFD, 20, 1, 0, 0, 1, 1, 33, 0, 0][..], &[7; 20], &[0, 0], &[9; 13]].concat();
     let packet = [&first, RECORDED_ATTITUDE, &second, RECORDED_PRESSURE].concat();

@@ -1,4 +1,4 @@
-//! Telemetry logs of ground stations (`.tlog`): each frame preceded by its timestamp.
+//! Telemetry logs of ground stations (`.tlog`). A timestamp precedes each frame.
 //!
 //! Source: MAVLink developer guide, "Telemetry logs": eight bytes, big-endian, microseconds since 1970.
 
@@ -6,7 +6,7 @@ use crate::frame::announced_bytes;
 
 const STAMP_BYTES: usize = 8;
 
-/// Iterates over the frames of a log without checking checksums. Ends after the first error.
+/// Iterates over the frames of a log. Checksums aren't checked. The iteration ends after the first error.
 #[derive(Debug, Clone)]
 pub struct Tlog<'a> {
     bytes: &'a [u8],
@@ -32,7 +32,7 @@ pub enum TlogError {
         /// Offset of the entry.
         offset: usize,
     },
-    /// No frame at the expected offset.
+    /// There is no frame at the expected offset.
     #[error(
         "reading a telemetry log: the entry at byte {offset} has 0x{got:02X} for a frame's start; 0xFE and 0xFD are allowed"
     )]
@@ -45,7 +45,7 @@ pub enum TlogError {
 }
 
 impl<'a> Tlog<'a> {
-    /// Reads a log from `bytes`.
+    /// Creates an iterator over the bytes of a log.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, offset: 0 }
     }
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn file_that_is_no_log_is_identified() {
+    fn file_that_is_no_log_is_reported() {
         let error = Tlog::new(&[0; 20]).next().unwrap().unwrap_err();
         assert_eq!(error, TlogError::Start { offset: 0, got: 0 });
         assert!(error.to_string().ends_with("has 0x00 for a frame's start; 0xFE and 0xFD are allowed"));

@@ -1,6 +1,6 @@
-//! Host side of an echosounder's line: settings first, then a distance each interval.
+//! Host side of an echosounder's line. The driver sends the settings first, and then gets a distance in each interval.
 //!
-//! Each setting must be acknowledged. Distances are requested, or sent continuously.
+//! The device must acknowledge each setting. The driver requests distances, or the device sends them continuously.
 
 use std::collections::VecDeque;
 
@@ -15,13 +15,13 @@ pub const CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Udp, Carrier::Tcp]
 
 /// Longest usual gap within a frame.
 const SILENCE: DurNs = DurNs::from_millis(50);
-/// Timeout of the answer to a setting or request. Source: Ping protocol, 50 ms; a bridge adds to it.
+/// Timeout of the answer to a setting or request. Source: Ping protocol, 50 ms, plus an allowance for a bridge.
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
-/// Allowance for a ping beyond the interval.
+/// Time that a distance may take beyond the interval.
 const PING_TIME: DurNs = DurNs::from_millis(250);
-/// Number of attempts to send a setting before the next.
+/// Number of times that a setting is sent before the driver goes on to the next one.
 const TRIES: u32 = 4;
-/// Interval of checks of the speed of sound, which other clients of a bridge can change.
+/// Interval at which the speed of sound is checked, since other clients of a bridge can change it.
 const LOOK_PERIOD: DurNs = DurNs::from_millis(10_000);
 
 const ECHOSOUNDER: u8 = 1;
@@ -29,7 +29,7 @@ const ECHOSOUNDER: u8 = 1;
 /// Purpose of the message in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Asked {
-    /// A setting or a device query, by message id.
+    /// A setting or a query about the device, by message id.
     Setting(u16),
     /// A distance request.
     Distance,
@@ -51,7 +51,7 @@ pub struct PingDriver {
 }
 
 impl PingDriver {
-    /// New driver with these settings.
+    /// Creates a driver with these settings.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
@@ -66,7 +66,7 @@ impl PingDriver {
         }
     }
 
-    /// Queues the settings and queries sent when the line opens.
+    /// Queues the settings and queries that are sent when the line opens.
     fn greet(&mut self) {
         let settings = self.settings;
         let interval_ms = u16::try_from(settings.interval.0 / 1_000_000).unwrap_or(u16::MAX);
@@ -94,7 +94,7 @@ impl PingDriver {
         self.to_say.extend(self.encoded(message).map(|bytes| (Asked::Setting(about), bytes)));
     }
 
-    /// Encodes a message to the device; host messages are far shorter than the longest frame.
+    /// Encodes a message to the device. Messages of a host are far shorter than the longest frame.
     fn encoded(&self, message: &Message) -> Option<Vec<u8>> {
         let addressed = Addressed { source: 0, destination: self.settings.device_id, message: *message };
         addressed.encode().ok().map(|bytes| bytes.as_slice().to_vec())
@@ -120,7 +120,7 @@ impl PingDriver {
         }
     }
 
-    /// Handles a timeout. Settings are retried, because a device that missed one would measure differently.
+    /// Handles a timeout. Settings are sent again, since a device that missed a setting would measure differently.
     fn give_up(&mut self, asked: Asked, now: MonoNs, wire: &mut dyn Wire) {
         self.asked = None;
         let Some((bytes, tries)) = self.again.take().filter(|(_, tries)| *tries > 0) else { return };
@@ -162,7 +162,7 @@ impl PingDriver {
         }
     }
 
-    /// Answer timeout.
+    /// Timeout of the answer to a message.
     fn timeout(&self, asked: Asked) -> DurNs {
         match asked {
             Asked::Setting(_) => ANSWER_TIME,
@@ -174,8 +174,7 @@ impl PingDriver {
         let other = self.device.filter(|device| device.device_type != ECHOSOUNDER);
         other
             .map(|device| match device.device_type {
-                2 => "is a Ping360, no echosounder; connect leads to another device than this sensor"
-                    .to_owned(),
+                2 => "is a Ping360 and not an echosounder; check connect".to_owned(),
                 other => format!("is a device of type {other}; an echosounder is of type {ECHOSOUNDER}"),
             })
             .or_else(|| self.refused.clone())
@@ -209,7 +208,7 @@ impl Driver for PingDriver {
         for frame in frames.iter().filter_map(|bytes| Frame::parse(bytes)) {
             self.answered(&frame);
         }
-        // Send the next setting at once, without waiting for a wake-up.
+        // The next setting is sent at once, without waiting for a wake-up.
         if self.asked.is_none() && !self.to_say.is_empty() {
             self.next(received, wire);
         }

@@ -14,7 +14,7 @@ use crate::codec::{
 };
 use crate::settings::Settings;
 
-/// Listening range of an emulated device: up to the practical limit of a `Ping1D`.
+/// Listening range of an emulated device. It extends to the practical limit of a `Ping1D`.
 const SCAN: ScanRange = ScanRange { start_mm: 0, length_mm: 30_000 };
 
 /// Longest usual gap within a frame.
@@ -37,11 +37,11 @@ const PROTOCOL: ProtocolVersion = ProtocolVersion { major: 1, minor: 0, patch: 0
 /// Pulse length of an emulated ping, us.
 const PULSE_US: u16 = 60;
 
-/// Number of points of an emulated echo, and the strength at the wall.
+/// Number of points of an emulated echo, and strength of the point at the wall.
 const POINTS: usize = 200;
 const ECHO: u8 = 255;
 
-/// Host and device on one line, or the device alone for a real host.
+/// An emulated device, with an emulated host if no real host polls.
 #[derive(Debug, Clone)]
 pub struct PingEmulator {
     settings: Settings,
@@ -54,11 +54,12 @@ pub struct PingEmulator {
     codec: PingCodec,
     heard_at: MonoNs,
     pings: u32,
-    /// Time of the next ping not requested by a real host: polled by the emulated host, or continuous.
+    /// Time of the next ping that isn't requested by a real host. The emulated host requests it, or the device pings
+    /// continuously.
     ping_at: Option<MonoNs>,
     /// Pings requested by a real host, not yet started.
     waiting: Vec<Sounding>,
-    /// Message ids of their answers.
+    /// Message ids of the answers to these pings.
     asked: VecDeque<u16>,
     polled: bool,
     /// Last frame sent.
@@ -66,7 +67,7 @@ pub struct PingEmulator {
 }
 
 impl PingEmulator {
-    /// A device that is polled from power-on by the emulated host, or on request by a real one.
+    /// Creates a device. The emulated host polls it from power-on, or a real host requests pings.
     pub fn new(settings: Settings, latency: DurNs, setup: &EmulatorSetup) -> Self {
         Self {
             settings,
@@ -85,7 +86,7 @@ impl PingEmulator {
         }
     }
 
-    /// Handles a message; returns the immediate answer, or `None` for a distance request.
+    /// Handles a message. Returns the answer if the device answers immediately, and `None` for a distance request.
     fn answer_to(&mut self, at: MonoNs, message: &Message) -> Option<Message> {
         match *message {
             Message::GeneralRequest(about @ (id::DISTANCE | id::DISTANCE_SIMPLE | id::PROFILE)) => {
@@ -116,7 +117,7 @@ impl PingEmulator {
         Some(Message::Ack(message.id()))
     }
 
-    /// Encodes a ping as a message of this id.
+    /// Encodes a ping as the message with this id.
     fn telling(&mut self, about: u16, distance_mm: Option<u32>) -> Message {
         self.pings = self.pings.wrapping_add(1);
         let distance = Distance {
@@ -137,7 +138,7 @@ impl PingEmulator {
         }
     }
 
-    /// Distance in mm, computed with the device's speed of sound setting.
+    /// Distance in mm, as computed by the device from its speed of sound setting.
     fn distance_mm(&self, range_m: Option<f64>) -> Option<u32> {
         let mm = range_m? * f64::from(self.device_mmps) / self.site_mps;
         let mm = u32::try_from(math::round_to_i64(mm)).ok()?;
@@ -151,7 +152,7 @@ impl PingEmulator {
     }
 }
 
-/// An echo with a single non-zero point.
+/// An echo in which only the point at the wall is not zero.
 fn strengths(distance_mm: Option<u32>) -> Bytes<MAX_STRENGTHS> {
     let mut strengths = [0; POINTS];
     let point = distance_mm.map(|mm| u64::from(mm) * POINTS as u64 / u64::from(SCAN.length_mm));
@@ -175,7 +176,7 @@ impl Emulator<Sounding> for PingEmulator {
 
     fn hear(&mut self, at: MonoNs, bytes: &[u8], line: LineSink<'_>) {
         let mut heard = Vec::new();
-        // A truncated frame must not swallow the following ones.
+        // A truncated frame must not hide the frames that follow.
         if at.since(self.heard_at) > SILENCE {
             self.codec.flush(&mut |value| heard.push(value));
         }

@@ -1,6 +1,7 @@
 //! Blue Robotics Ping echosounders (`Ping1D`, Ping2): the Ping protocol, a decoder for the loop and an emulated device.
 //!
-//! Converts bytes to values and back without I/O; the port (serial, or the vehicle's UDP bridge) is another layer.
+//! The crate converts bytes to values and back without I/O. The port (serial, or the vehicle's UDP bridge) is another
+//! layer.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

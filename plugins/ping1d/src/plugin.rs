@@ -20,11 +20,12 @@ use crate::settings::Settings;
 /// Name in vehicle files and logs.
 const NAME: &str = "ping1d";
 
-/// Room for several of the longest frames.
+/// Buffer for several of the longest frames.
 const RING_BYTES: usize = 1 << 16;
 
-/// Longest usual gap within a frame; after it an unfinished frame is dropped. It is below the usual interval, so that
-/// a false start can hold back one reading at most.
+/// Longest usual gap within a frame. An unfinished frame is dropped after this gap.
+///
+/// The gap is shorter than the usual interval, so a false frame start delays one reading at most.
 const SILENCE: DurNs = DurNs::from_millis(50);
 
 /// The Ping echosounder device kind.
@@ -71,7 +72,7 @@ impl Device for Ping1d {
         Emulated::Echosounder(Box::new(PingEmulator::new(self.settings, self.sensor.latency, setup)))
     }
 
-    /// Replaces a profile by a distance message, without the echo strengths.
+    /// Replaces a profile with a distance message, which has no echo strengths.
     fn without(&self, what: OptionalPayload, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
         shorter.clear();
         what == OptionalPayload::Echoes && without_strengths(packet, shorter).is_some()
@@ -90,18 +91,18 @@ impl Device for Ping1d {
     }
 }
 
-/// Writes a packet that is one profile as a distance message; `None` for other packets.
+/// Converts a packet that is one profile to a distance message; `None` for other packets.
 fn without_strengths(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     let whole = Frames.read(packet)?;
     let Message::Profile(profile) = whole.message else { return None };
-    // Packets that don't re-encode identically are left unchanged.
+    // A packet that doesn't re-encode identically is left unchanged.
     (whole.encode().ok()?.as_slice() == packet).then_some(())?;
     let distance = Addressed { message: Message::Distance(profile.distance), ..whole };
     shorter.extend_from_slice(distance.encode().ok()?.as_slice());
     Some(())
 }
 
-/// Converts messages to readings, including distances requested by other clients.
+/// Converts messages to readings, including distances that other clients requested.
 #[derive(Debug, Clone)]
 pub struct PingDecoder {
     codec: PingCodec,
@@ -114,7 +115,7 @@ pub struct PingDecoder {
 stateful!(PingDecoder { state: codec, clock, withheld; fixed: settings, latency; });
 
 impl PingDecoder {
-    /// New decoder with these settings.
+    /// Creates a decoder with these settings.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
         let (codec, clock) = (PingCodec::default(), LineClock::new(SILENCE));
         Self { codec, clock, settings, latency, withheld: 0 }
@@ -127,7 +128,7 @@ impl Decoder for PingDecoder {
         clock.push(codec, packet.received, packet.bytes, |received, frame| {
             let Some(frame) = Frame::parse(frame) else { return };
             let Some((distance_mm, confidence_percent)) = distance(&frame) else { return };
-            // Values above 100 per cent are undefined.
+            // Values above 100 per cent are undefined, so the distance is withheld.
             if frame.source != settings.device_id || confidence_percent > 100 {
                 *withheld += 1;
                 return;
@@ -146,13 +147,13 @@ impl Decoder for PingDecoder {
         self.codec.counts()
     }
 
-    /// Distances withheld: other device ids, or undefined confidence.
+    /// Number of distances withheld: those of other device ids, and those with an undefined confidence.
     fn withheld(&self) -> u64 {
         self.withheld
     }
 }
 
-/// Distance in mm and confidence in per cent of a distance, simple distance or profile frame.
+/// Distance in mm and confidence in per cent, read from a distance, simple distance or profile frame.
 fn distance(frame: &Frame<'_>) -> Option<(u32, u16)> {
     let simple = DistanceSimple::of(frame).map(|it| (it.distance_mm, u16::from(it.confidence_percent)));
     simple.or_else(|| Distance::of(frame).map(|it| (it.distance_mm, it.confidence_percent)))

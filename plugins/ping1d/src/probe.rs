@@ -1,4 +1,4 @@
-//! Probes for a Ping device: requests version and identity from any device id.
+//! Probes for a Ping device: requests version and identity from all device ids.
 
 use headrace_sensor::codec::Codec as _;
 use headrace_sensor::driver::Probe;
@@ -17,7 +17,7 @@ pub struct PingProbe {
 }
 
 impl Probe for PingProbe {
-    /// The version comes first, so that it is known when the identity arrives.
+    /// The version is requested first, so that it is known when the identity arrives.
     fn questions(&self) -> Vec<Vec<u8>> {
         let asked = [id::PROTOCOL_VERSION, id::DEVICE_INFORMATION].into_iter().filter_map(|about| {
             let message = Message::GeneralRequest(about);

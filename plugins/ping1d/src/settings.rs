@@ -7,7 +7,7 @@ use headrace_sensor::geometry::time::DurNs;
 
 use crate::codec::ScanRange;
 
-/// Trigger of pings.
+/// Trigger of the pings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Polling {
     /// The host requests each distance.
@@ -19,31 +19,31 @@ pub enum Polling {
 /// An echosounder's settings, checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Minimum confidence (0 to 1) of readings used by navigation.
+    /// Minimum confidence, 0 to 1, of readings that navigation uses.
     pub min_confidence: f64,
     /// Time between two pings.
     pub interval: DurNs,
     /// Speed of sound setting of the device, m/s.
     pub sound_speed_mps: f64,
-    /// The device's id on its line.
+    /// Device id on the line.
     pub device_id: u8,
     /// Trigger of pings.
     pub polling: Polling,
-    /// Listening range; `None` leaves range and gain to the device.
+    /// Listening range; `None` if the device chooses range and gain.
     pub scan: Option<ScanRange>,
-    /// Gain index, 0 to 6; `None` leaves it unchanged.
+    /// Gain index, 0 to 6; `None` to leave the device's gain unchanged.
     pub gain: Option<u8>,
 }
 
 impl Settings {
     /// Reads an echosounder's keys.
     ///
-    /// Errors: a key that isn't allowed, or a latency that isn't below the interval.
+    /// Errors: a key isn't allowed, or the latency isn't below the interval.
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
         let device_id = own.integer("device_id", 1..=254)?.and_then(|id| u8::try_from(id).ok());
         let settings = Self {
             min_confidence: own.number("min_confidence", 0.0..=1.0)?.unwrap_or(0.5),
-            // The protocol's interval is 16 bits in whole milliseconds.
+            // In the protocol the interval is a 16-bit number of whole milliseconds.
             interval: DurNs::from_millis(own.integer("interval_ms", 10..=65_535)?.unwrap_or(66)),
             sound_speed_mps: own.number("sound_speed_mps", 1000.0..=2000.0)?.unwrap_or(1500.0),
             device_id: device_id.unwrap_or(1),
@@ -87,7 +87,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Settings from the text of a table.
+    /// Settings from the text of a vehicle file's table.
     pub(crate) fn settings(text: &str) -> Result<Settings, ConfigError> {
         let root = Document::new("v.toml", text).root()?;
         let settings = Settings::read(&sensor(), &root)?;

@@ -11,7 +11,7 @@ use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
 use crate::tracker::{CountTracker, Counting, TrackerHealth};
 
-/// Longest usual gap within a line; after it an unfinished line is dropped.
+/// Longest usual gap within a line. An unfinished line is dropped after this gap.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 const MILLISECOND: DurNs = DurNs::from_millis(1);
@@ -21,13 +21,13 @@ const MILLISECOND: DurNs = DurNs::from_millis(1);
 pub struct Counter {
     /// Report layout.
     pub layout: ReportLayout,
-    /// True if the auxiliary value is the device time in milliseconds.
+    /// Whether the auxiliary value is the device time in milliseconds.
     pub auxiliary_is_ms: bool,
-    /// Absolute or incremental count.
+    /// Whether counts are absolute or changes.
     pub counting: Counting,
     /// Counts per metre of cable; negative if the count falls as cable is paid out.
     pub counts_per_metre: f64,
-    /// Smallest change of the length by the wheel's construction, m; 0 if it is one count.
+    /// Smallest change of the length that the wheel can detect, m; 0 if this is one count.
     pub step_m: f64,
     /// Maximum winch speed, m/s.
     pub max_speed_mps: f64,
@@ -66,9 +66,9 @@ pub struct LineDecoder {
 stateful!(LineDecoder { state: codec, clock; fixed: metres_per_unit, latency; });
 
 impl HidDecoder {
-    /// New decoder.
+    /// Creates a decoder.
     ///
-    /// Errors: an invalid layout.
+    /// Errors: the layout is invalid.
     pub fn new(counter: Counter) -> Result<Self, LayoutError> {
         counter.layout.check()?;
         let max_counts_per_s = counter.max_speed_mps * counter.counts_per_metre.abs();
@@ -86,7 +86,7 @@ impl HidDecoder {
         self.tracker.health()
     }
 
-    /// Status byte of the last report, if the layout has one; its meaning is device-specific.
+    /// Status byte of the last report, if the layout has one. Its meaning depends on the device.
     pub fn status(&self) -> Option<u8> {
         self.status
     }
@@ -119,7 +119,7 @@ impl Decoder for HidDecoder {
         self.codec.counts()
     }
 
-    /// Reports rejected as faster than the winch.
+    /// Number of reports rejected because the change was faster than the winch.
     fn withheld(&self) -> u64 {
         self.health().rejected
     }
@@ -130,7 +130,7 @@ impl Decoder for HidDecoder {
 }
 
 impl LineDecoder {
-    /// Decoder of lines with payout in units of `metres_per_unit`.
+    /// Creates a decoder of lines whose payout is in units of `metres_per_unit`.
     pub fn new(metres_per_unit: f64, latency: DurNs) -> Self {
         Self { codec: LineCodec::default(), clock: LineClock::new(SILENCE), metres_per_unit, latency }
     }

@@ -1,4 +1,4 @@
-//! Host side of a counter's line: it only listens.
+//! Host side of a counter's line. The driver only listens.
 
 use headrace_sensor::driver::{Carrier, Listener, MessageListener};
 use headrace_sensor::geometry::time::DurNs;
@@ -6,9 +6,9 @@ use headrace_sensor::geometry::time::DurNs;
 use crate::line::{Lines, MAX_LINE_BYTES};
 use crate::report::ReportLayout;
 
-/// Supported carriers of reports.
+/// Supported carriers of HID reports.
 pub const REPORT_CARRIERS: [Carrier; 2] = [Carrier::Hid, Carrier::Udp];
-/// Supported carriers of lines.
+/// Supported carriers of text lines.
 pub const LINE_CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Tcp, Carrier::Udp];
 
 const PATIENCE: DurNs = DurNs::from_millis(5_000);
@@ -30,7 +30,7 @@ pub fn reports(layout: ReportLayout) -> MessageListener {
     MessageListener::new(Box::new(judge), PATIENCE)
 }
 
-/// Driver of a counter that sends lines.
+/// Driver of a counter that sends text lines.
 pub fn lines() -> Listener<Lines, MAX_LINE_BYTES> {
     Listener::new(Lines, SILENCE, PATIENCE)
 }

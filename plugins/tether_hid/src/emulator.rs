@@ -1,4 +1,4 @@
-//! Counter side of the line: a report, or a text line, at a fixed rate.
+//! Counter side of the line. The emulator sends a report, or a text line, at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::math;
@@ -10,13 +10,13 @@ use crate::line::{Decimal, LineReading};
 use crate::report::Report;
 use crate::tracker::Counting;
 
-/// Status of an emulated counter: valid.
+/// Status byte of an emulated counter, which means valid.
 const STATUS_WELL: u8 = 1;
 
-/// Decimal places of an emulated line: millimetres.
+/// Number of decimal places in an emulated line, for millimetres.
 const LINE_PLACES: u8 = 3;
 
-/// Emulation settings.
+/// Settings of the emulated counter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CounterSettings {
     /// Chainage at which the counter reads zero, m.
@@ -29,7 +29,7 @@ pub struct CounterSettings {
     pub latency: DurNs,
 }
 
-/// Ideal HID counter: no noise and no added delay, but whole counts.
+/// An ideal emulated HID counter: there is no noise and no added delay, but counts are whole numbers.
 #[derive(Debug, Clone)]
 pub struct HidEmulator {
     reeling: CounterSettings,
@@ -40,7 +40,7 @@ pub struct HidEmulator {
     told_counts: i64,
 }
 
-/// Ideal LCI-90: no noise and no added delay, but whole millimetres.
+/// An ideal emulated LCI-90: there is no noise and no added delay, but lengths are whole millimetres.
 #[derive(Debug, Clone)]
 pub struct LineEmulator {
     reeling: CounterSettings,
@@ -51,7 +51,7 @@ pub struct LineEmulator {
 }
 
 impl CounterSettings {
-    /// Time from the start to a report on the counter's clock.
+    /// Time of a report on the counter's clock, counted from the start.
     fn elapsed(&self, report: u64) -> DurNs {
         DurNs::from_secs_f64(report as f64 / self.rate_hz)
     }
@@ -64,19 +64,19 @@ impl CounterSettings {
         }
     }
 
-    /// Cable paid out, m.
+    /// Length of cable paid out, m.
     fn length_m(&self, payout: &Payout) -> f64 {
         (payout.chainage_m - self.zero_at_m) / self.scale
     }
 }
 
 impl HidEmulator {
-    /// A counter that is switched on, and first reports, at `start`.
+    /// Creates a counter that is switched on, and first reports, at `start`.
     pub fn new(reeling: CounterSettings, counter: Counter, start: MonoNs) -> Self {
         Self { reeling, counter, start, begun: 0, told: 0, told_counts: 0 }
     }
 
-    /// Count of the next report; in delta mode a change too large for the report is spread over several.
+    /// Count in the next report. In delta mode, a change too large for one report is spread over several reports.
     fn count(&mut self, counts: i64) -> i64 {
         let layout = &self.counter.layout;
         match self.counter.counting {
@@ -111,7 +111,7 @@ impl Emulator<Payout> for HidEmulator {
 }
 
 impl LineEmulator {
-    /// A monitor that is switched on, and first sends a line, at `start`.
+    /// Creates a monitor that is switched on, and first sends a line, at `start`.
     pub fn new(reeling: CounterSettings, metres_per_unit: f64, start: MonoNs) -> Self {
         Self { reeling, metres_per_unit, start, begun: 0, before: None }
     }

@@ -11,18 +11,19 @@
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 use headrace_sensor::geometry::math;
 
-/// Templates of the two lines: 9 is a digit, # a character of a number, all else literal.
+/// Templates of the two kinds of lines. 9 stands for a digit, # for a character of a number, and all other characters
+/// for themselves.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
 /// Maximum line length.
 pub const MAX_LINE_BYTES: usize = STAMPED.len();
 
-/// Template offset behind `RD,`, from which a match is unlikely to be chance.
+/// Offset in a template after `RD,`. A match up to this offset is unlikely to be chance.
 const PLAIN_MARKER: usize = 3;
 const STAMPED_MARKER: usize = 5;
 
 const NUMBER_CHARS: usize = 8;
-/// Length of checksum, CR and LF.
+/// Length of checksum, CR and LF, bytes.
 const TAIL_BYTES: usize = 6;
 const POWERS_OF_TEN: [i32; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000];
 
@@ -33,7 +34,7 @@ pub struct Decimal {
     places: u8,
 }
 
-/// Measurement time of a winch. Digits as sent, without a calendar check: readings use the receive time.
+/// Measurement time of a winch, with digits as sent. The calendar isn't checked, since readings use the receive time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamp {
     /// Winch number, 0 to 99.
@@ -49,7 +50,7 @@ pub struct Stamp {
 /// One line, in the units configured in the monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineReading {
-    /// Winch and time, in LCI-90i lines.
+    /// Winch and time, which only LCI-90i lines have.
     pub stamp: Option<Stamp>,
     /// Cable tension.
     pub tension: Decimal,
@@ -63,7 +64,7 @@ impl Decimal {
     /// Zero.
     pub const ZERO: Self = Self { mantissa: 0, places: 0 };
 
-    /// `mantissa` / 10^`places`; `None` if it doesn't fit eight characters.
+    /// The number `mantissa` / 10^`places`; `None` if it doesn't fit eight characters.
     pub fn new(mantissa: i32, places: u8) -> Option<Self> {
         let signs = usize::from(mantissa < 0) + usize::from(places > 0);
         let digits = NUMBER_CHARS - signs;
@@ -73,7 +74,8 @@ impl Decimal {
         fits.then_some(Self { mantissa, places })
     }
 
-    /// Number nearest to `value` with as many places as fit, at most `most_places`; zero if it can't be represented.
+    /// Number nearest to `value`, with as many decimal places as fit but at most `most_places`; zero if none can
+    /// represent it.
     pub fn nearest(value: f64, most_places: u8) -> Self {
         let with = |places: u8| {
             let scale = f64::from(*POWERS_OF_TEN.get(usize::from(places))?);
@@ -87,7 +89,7 @@ impl Decimal {
         f64::from(self.mantissa) * self.quantum()
     }
 
-    /// Value of the last place.
+    /// Value of one unit in the last decimal place.
     pub fn quantum(self) -> f64 {
         1.0 / POWERS_OF_TEN.get(usize::from(self.places)).copied().map_or(1.0, f64::from)
     }
@@ -155,7 +157,7 @@ impl LineReading {
         line
     }
 
-    /// Decodes a line that matches its template; `None` for a wrong checksum or number.
+    /// Decodes a line that matches its template; `None` if the checksum or a number is wrong.
     fn decode(line: &[u8]) -> Option<Self> {
         let (summed, tail) = line.split_at_checked(line.len().checked_sub(TAIL_BYTES)?)?;
         if integer(tail.get(..4)?)? != sum(summed) {
@@ -192,11 +194,11 @@ fn sum(chars: &[u8]) -> u32 {
     chars.iter().map(|char| u32::from(*char)).sum()
 }
 
-/// Framing of lines in a character stream.
+/// Separates lines in a character stream.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lines;
 
-/// Decodes a serial line's bytes into readings.
+/// Decodes the bytes of a serial line into line readings.
 pub type LineCodec = Framed<Lines, MAX_LINE_BYTES>;
 
 impl Framing for Lines {
@@ -251,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn worked_example_5_a_recorded_line_passes_its_sum() {
+    fn worked_example_5_decodes_a_recorded_line() {
         let got = decode_all(&mut LineCodec::default(), RECORDED);
         let stamp = got[0].stamp.unwrap();
         assert_eq!((stamp.winch, stamp.year, stamp.millisecond), (3, 2022, 502));
@@ -282,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_use_the_places_that_fit() {
+    fn numbers_have_as_many_decimal_places_as_fit() {
         assert_eq!(Decimal::nearest(-12.3456, 3), Decimal::new(-12_346, 3).unwrap());
         assert_eq!(Decimal::nearest(12_345.678, 3), Decimal::new(1_234_568, 2).unwrap());
         assert_eq!(Decimal::nearest(1e12, 3), Decimal::ZERO);

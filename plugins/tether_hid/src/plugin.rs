@@ -16,7 +16,7 @@ use crate::tracker::Counting;
 /// Name in vehicle files.
 pub const NAME: &str = "tether_hid";
 
-/// Room for a minute of reports at the usual rate.
+/// Buffer for a minute of reports at the usual rate.
 const RING_BYTES: usize = 1 << 17;
 
 const METRES_PER_FOOT: f64 = 0.3048;
@@ -40,15 +40,17 @@ enum Wire {
     Line { metres_per_unit: f64 },
 }
 
-/// A common type of counter.
+/// Defaults for a common type of counter.
 #[derive(Clone, Copy)]
 struct Preset {
     counts_per_metre: f64,
-    /// Noise without rounding, m: the cable slips a little on its wheel.
+    /// Standard deviation without rounding, m. The cable slips a little on its wheel.
     sd_m: f64,
 }
 
-/// Common types: an encoder of 1,000 counts a turn on a wheel of 0.5 m, and a wheel with a magnet every centimetre.
+/// Common types of counters: an encoder with 1,000 counts per turn on a wheel of 0.5 m, and a wheel with a magnet every
+/// centimetre.
+///
 /// The noise is assumed, not from a datasheet.
 const PRESETS: [(&str, Preset); 2] = [
     ("encoder_wheel", Preset { counts_per_metre: 2000.0, sd_m: 0.005 }),
@@ -118,8 +120,8 @@ fn hid(reeling: &CounterSettings, own: &Section<'_>) -> Result<Wire, ConfigError
     let half = (1_u64 << (layout.width.bits() - 1)) as f64;
     if between_reports >= half {
         let problem = format!(
-            "is too fast: {between_reports} counts between two reports, and the counter's width must tell them \
-             from going round, so that below {half} are allowed"
+            "is too fast: {between_reports} counts between two reports; a counter of this width allows fewer than \
+             {half}"
         );
         return Err(own.invalid("max_speed_mps", &problem));
     }
@@ -137,8 +139,8 @@ fn hid(reeling: &CounterSettings, own: &Section<'_>) -> Result<Wire, ConfigError
     Ok(Wire::Hid { decoder: Box::new(decoder), counter, sd_m: preset.map(|preset| preset.sd_m) })
 }
 
-/// The reference layout, overridden by the keys. Sequence, status and auxiliary value default to the reference only if the
-/// rest of the layout is the reference's.
+/// The reference layout, with the values of the keys. If the keys change the layout, sequence, status and auxiliary
+/// value no longer default to the reference's.
 fn report_layout(own: &Section<'_>) -> Result<ReportLayout, ConfigError> {
     let reference = ReportLayout::REFERENCE;
     let byte = |key, least, usual: usize| -> Result<usize, ConfigError> {

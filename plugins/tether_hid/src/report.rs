@@ -1,4 +1,4 @@
-//! HID reports with the layout given in the vehicle file, because no cable counter with a published report is known.
+//! HID reports, whose layout is given in the vehicle file, since no cable counter with a published report is known.
 //!
 //! The reference layout is defined by this project, for emulated counters:
 //! ```text
@@ -23,7 +23,7 @@ pub const REFERENCE_DESCRIPTOR: [u8; 59] = [
     0x81, 0x02, 0xC0, // end of collection
 ];
 
-/// Bits of a counter before it wraps.
+/// Number of bits of a counter that wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Width {
     /// One byte.
@@ -43,7 +43,7 @@ pub enum Endian {
     Big,
 }
 
-/// Layout of a report. Offsets count from the report's first byte, which is the id if there is one.
+/// Layout of a report. Offsets are counted from the report's first byte, which is the id if the device has ids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReportLayout {
     /// Report id; `None` for a device without ids.
@@ -54,15 +54,15 @@ pub struct ReportLayout {
     pub offset: usize,
     /// Width of the count.
     pub width: Width,
-    /// True for two's complement.
+    /// Whether the count is in two's complement.
     pub signed: bool,
     /// Byte order of the count.
     pub endian: Endian,
-    /// Offset of a sequence byte, incremented with each report.
+    /// Offset of a sequence byte, which increases by one with each report.
     pub sequence_offset: Option<usize>,
-    /// Offset of a status byte; its meaning is device-specific.
+    /// Offset of a status byte, whose meaning depends on the device.
     pub status_offset: Option<usize>,
-    /// Offset of a device-specific little-endian i32.
+    /// Offset of a little-endian i32, whose meaning depends on the device.
     pub auxiliary_offset: Option<usize>,
 }
 
@@ -79,14 +79,14 @@ pub struct Report {
     pub auxiliary: Option<i32>,
 }
 
-/// Reason why a layout is invalid.
+/// A reason why a layout is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LayoutError {
-    /// Invalid report length.
+    /// The report length is invalid.
     #[error("laying out a report of {0} bytes; allowed are 1 to {MAX_REPORT_BYTES}")]
     Length(usize),
-    /// A field extends beyond the end.
+    /// A field extends beyond the end of the report.
     #[error("laying out {what} at offset {offset}, {bytes} bytes: the report has {report_bytes}")]
     Outside {
         /// Name of the field.
@@ -107,7 +107,7 @@ pub enum LayoutError {
         offset: usize,
         /// Length of the field.
         bytes: usize,
-        /// Name of the overlapped field.
+        /// Name of the field that it overlaps.
         other: &'static str,
     },
 }
@@ -126,21 +126,21 @@ impl Width {
         self.bits() as usize / 8
     }
 
-    /// `count` wrapped to the width.
+    /// `count`, wrapped to the width of the counter.
     pub fn wrapped(self, count: i64, signed: bool) -> i64 {
         let modulus = 1_i64 << self.bits();
         let above = count.rem_euclid(modulus);
         if signed && above >= modulus / 2 { above - modulus } else { above }
     }
 
-    /// Wrapped difference from `before` to `after`, the short way round.
+    /// Difference from `before` to `after`, taken the short way round the wrap.
     pub fn difference(self, before: i64, after: i64) -> i64 {
         self.wrapped(after.wrapping_sub(before), true)
     }
 }
 
 impl ReportLayout {
-    /// Layout of [`REFERENCE_DESCRIPTOR`].
+    /// The layout that [`REFERENCE_DESCRIPTOR`] describes.
     pub const REFERENCE: Self = Self {
         report_id: Some(1),
         report_bytes: 11,
@@ -153,9 +153,10 @@ impl ReportLayout {
         auxiliary_offset: Some(7),
     };
 
-    /// Descriptor of a vendor-defined device with one report of this layout's length and id.
+    /// Report descriptor of a vendor-defined device with one report of this layout's length and id.
     ///
-    /// Source: USB HID 1.11, 6.2.2: usage page, usage, collection, id, usage, limits, size, count, input, end.
+    /// Source: USB HID 1.11, 6.2.2. The items are usage page, usage, collection, id, usage, limits, size, count, input,
+    /// end.
     pub fn descriptor(&self) -> Vec<u8> {
         if *self == Self::REFERENCE {
             return REFERENCE_DESCRIPTOR.to_vec();
@@ -169,9 +170,9 @@ impl ReportLayout {
         descriptor
     }
 
-    /// Checks that every field lies within the report and that none overlap.
+    /// Checks that every field lies within the report and that no fields overlap.
     ///
-    /// Errors: an invalid report length, a field outside, an overlap.
+    /// Errors: the report length is invalid, a field lies outside the report, or two fields overlap.
     pub fn check(&self) -> Result<(), LayoutError> {
         let report_bytes = self.report_bytes;
         if !(1..=MAX_REPORT_BYTES).contains(&report_bytes) {
@@ -198,7 +199,7 @@ impl ReportLayout {
         Ok(())
     }
 
-    /// Decodes a whole report; `None` if length or id differ.
+    /// Decodes a whole report; `None` if the length or the id differs from the layout's.
     pub fn decode(&self, bytes: &[u8]) -> Option<Report> {
         if bytes.len() != self.report_bytes || self.report_id.is_some_and(|id| bytes.first() != Some(&id)) {
             return None;
@@ -213,7 +214,7 @@ impl ReportLayout {
         })
     }
 
-    /// Encodes a whole report; fields without a place in the layout are omitted, missing values are zero.
+    /// Encodes a whole report. Fields that the layout lacks are omitted, and missing values are zero.
     pub fn encode(&self, report: &Report) -> Vec<u8> {
         let mut bytes = vec![0; self.report_bytes];
         let mut put = |offset: usize, value: &[u8]| {
@@ -253,7 +254,7 @@ impl ReportLayout {
     }
 }
 
-/// Header of a `uhid_event` that passes a report to the kernel: `UHID_INPUT2` and the report's length.
+/// Header of a `uhid_event` that passes a report to the kernel: the type `UHID_INPUT2` and the report's length.
 ///
 /// Source: linux/uhid.h, `struct uhid_input2_req`, native byte order.
 pub fn uhid_input2_header(report_bytes: u16) -> [u8; 6] {
@@ -289,7 +290,7 @@ mod tests {
     const EXAMPLE: [u8; 11] = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
 
     #[test]
-    fn any_count_can_be_wrapped() {
+    fn wrapping_works_for_extreme_counts() {
         for width in [Width::Bits8, Width::Bits16, Width::Bits32] {
             assert_eq!([i64::MAX, i64::MIN].map(|count| width.wrapped(count, true)), [-1, 0]);
             let most = (1 << width.bits()) - 1;
@@ -314,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn worked_example_2_precedes_a_report_for_the_kernel() {
+    fn worked_example_2_gives_the_uhid_header_of_a_report() {
         let event = [&uhid_input2_header(11)[..], &EXAMPLE].concat();
         if cfg!(target_endian = "little") {
             assert_eq!(event[..8], [0x0C, 0x00, 0x00, 0x00, 0x0B, 0x00, 0x01, 0x2A]);
@@ -374,7 +375,8 @@ mod tests {
         assert_eq!(codec.counts(), CodecCounts { good_frames: 0, bad_frames: 1, skipped_bytes: 12 });
     }
 
-    /// Two bytes, big-endian, unsigned, no id: as different from the reference as the keys allow.
+    /// A layout with a count of two bytes, big-endian, unsigned and without an id. It differs from the reference as
+    /// much as the keys allow.
     const PLAIN: ReportLayout = ReportLayout {
         report_id: None,
         report_bytes: 5,

@@ -14,7 +14,7 @@ use crate::decoder::{Counter, HidDecoder, LineDecoder};
 use crate::report::{Endian, Report, ReportLayout, Width};
 use crate::tracker::Counting;
 
-/// Chainage of a vehicle moving inward at 0.5 m/s from chainage 20 m.
+/// Chainage of a vehicle that moves inwards at 0.5 m/s from chainage 20 m.
 fn chainage_m(at: MonoNs) -> f64 {
     20.0 + 0.5 * at.as_secs_f64()
 }
@@ -59,7 +59,7 @@ fn length(decoded: &Decoded) -> TetherLength {
     }
 }
 
-/// Feeds the emulated device to `decoder` and compares each reading with the truth.
+/// Passes the emulated device's messages to `decoder`, and compares each reading with the truth.
 fn round_trip(own: &str, decoder: &mut dyn Decoder, zero_at_m: f64, scale: f64, reports: usize) {
     let setup = EmulatorSetup { start: MonoNs(7), head: None, site: Site::default(), polled: true };
     let Emulated::Tether(mut emulator) = configured(own).unwrap().emulator(&setup) else {
@@ -120,7 +120,7 @@ fn narrow_falling_big_endian_counter_round_trips() {
     let counter = Counter { layout, counts_per_metre: -1500.0, ..reference_counter() };
     let own = "report_id = 0\nreport_bytes = 4\noffset = 1\nwidth_bits = 16\nendian = \"big\"\n\
                counts_per_metre = -1500\nzero_at_m = 10.0\n";
-    // 16 bits wrap after 22 m on either side; the run goes from 10 m to 60 m.
+    // A count of 16 bits wraps after 22 m in either direction; the vehicle moves from 10 m to 60 m of chainage.
     round_trip(own, &mut HidDecoder::new(counter).unwrap(), 10.0, 1.0, 5000);
 }
 
@@ -145,7 +145,7 @@ fn counter_clock_is_followed_if_configured() {
     assert_eq!((clock.stamps, clock.restarts, clock.jumps), (2000, 0, 0));
     assert_eq!(clock.span, DurNs::from_millis(39_980));
     assert!(clock.drift.unwrap().ppm.abs() < 1e-6, "{clock:?}");
-    // A clock value from 2^31 ms on is negative on the wire, and must not count as a restart.
+    // A clock value from 2^31 ms on is negative on the wire, but must not count as a restart.
     let mut decoder = HidDecoder::new(Counter { auxiliary_is_ms: true, ..reference_counter() }).unwrap();
     for (second, ms) in [i32::MAX - 999, i32::MIN, i32::MIN + 1000].into_iter().enumerate() {
         let report = Report { sequence: None, status: None, count: 0, auxiliary: Some(ms) };

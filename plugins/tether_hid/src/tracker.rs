@@ -1,14 +1,14 @@
 //! Converts a counter that wraps, jumps and restarts into a continuous count of cable paid out.
 //!
-//! - A counter wraps: changes are taken the short way round.
-//! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other: when
-//!   [`PERSIST`] in a row agree, the counter has moved and the reports weren't corrupt.
-//!   - If the first of them was near zero, the device counts from zero again. The length continues from its last
-//!     value and is marked with the restart, which may be that of a replugged device. After a silence, too, a step
-//!     back to zero is accepted directly only if the winch covers it in a second.
+//! - A counter wraps. Changes are therefore taken the short way round.
+//! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other. If
+//!   [`PERSIST`] consecutive reports agree, the counter has really moved, and the reports weren't corrupt.
+//!   - If the first of these reports was near zero, the device counts from zero again. The length continues from its
+//!     last value and is marked with the restart, since the device may have been replugged.
 //!   - Otherwise the counter's new value is accepted.
-//! - In both cases, and whenever counts may have been lost, the length is no longer certain: `re_zero_needed` is set
-//!   and stays.
+//! - After a silence, too, a step back to zero is accepted directly only if the winch can cover it in a second.
+//! - After an accepted jump, and whenever counts may have been lost, the length is uncertain. `re_zero_needed` is then
+//!   set, and stays set.
 
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::CountRestart;
@@ -17,22 +17,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Report, Width};
 
-/// Consecutive consistent reports required to accept a jump.
+/// Number of consecutive consistent reports that are needed to accept a jump.
 pub const PERSIST: u32 = 5;
 
-/// Slack for reports queued in the kernel, which arrive together with hardly any time between them, s.
+/// Additional time allowed for a change, s. Reports queued in the kernel arrive together, with hardly any time between
+/// them.
 const SLACK_S: f64 = 0.1;
 
-/// Maximum counting time of a replugged device before its first report, s.
+/// Maximum time for which a replugged device has counted before its first report, s.
 const FRESH_S: f64 = 1.0;
 
-/// Least silence of a replugged device. Source: USB 2.0, 7.1.7.3, debounce interval.
+/// Minimum silence of a device that is replugged. Source: USB 2.0, 7.1.7.3, debounce interval.
 const AWAY: DurNs = DurNs::from_millis(100);
 
 /// Meaning of a report's count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counting {
-    /// Count since the device's zero, wrapping.
+    /// Count since the device's zero. The count wraps.
     Absolute,
     /// Change since the previous report.
     Delta,
@@ -41,15 +42,15 @@ pub enum Counting {
 /// Health of the tracker. Counters only grow, and the flag stays set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TrackerHealth {
-    /// Reports rejected as faster than the winch.
+    /// Number of reports rejected because the change was faster than the winch.
     pub rejected: u64,
-    /// Reports missing from the sequence.
+    /// Number of reports missing from the sequence.
     pub lost: u64,
-    /// True if counts may have been lost, so that the length's zero is uncertain.
+    /// Whether counts may have been lost, so that the length's zero is uncertain.
     pub re_zero_needed: bool,
 }
 
-/// Tracks a counter.
+/// Tracks the count of a counter.
 #[derive(Debug, Clone)]
 pub struct CountTracker {
     counting: Counting,
@@ -76,7 +77,7 @@ struct Seen {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
     from_zero: bool,
-    /// Time of the first of them.
+    /// Time of the first of these reports.
     since: MonoNs,
     last: Seen,
     agreeing: u32,
@@ -98,7 +99,7 @@ impl CountTracker {
         }
     }
 
-    /// The last restart of the count from zero.
+    /// The last restart of the count from zero, if any.
     pub fn restart(&self) -> Option<CountRestart> {
         self.restart
     }
@@ -113,7 +114,7 @@ impl CountTracker {
         let repeated = self.note_sequence(report.sequence);
         let now = Seen { count: report.count, at };
         match self.counting {
-            // Adding a change twice would be wrong, while reading a count twice is harmless.
+            // A repeated change must not be added twice, while reading the same absolute count twice is harmless.
             Counting::Delta if repeated => None,
             Counting::Delta => self.take_delta(now),
             Counting::Absolute => self.take_absolute(now),
@@ -162,13 +163,13 @@ impl CountTracker {
             self.jumped = Some(Jump { from_zero, since: now.at, last: now, agreeing: 1 });
             return None;
         }
-        // During a long silence the counter may have wrapped any number of times.
+        // During a long silence, the counter may have wrapped any number of times.
         let half = (1_u64 << self.width.bits()) as f64 / 2.0;
         self.health.re_zero_needed |= self.max_counts_per_s * now.at.since(before.at).as_secs_f64() >= half;
         self.accept(now, change)
     }
 
-    /// Handles another report that agrees with the rejected ones.
+    /// Handles another report that agrees with the rejected reports of a jump.
     fn agree(&mut self, before: Seen, jump: Jump, now: Seen) -> Option<i64> {
         let agreeing = jump.agreeing + 1;
         if agreeing < PERSIST {
@@ -196,12 +197,12 @@ impl CountTracker {
         Some(self.total)
     }
 
-    /// True if the winch can have moved by `change` counts between two times.
+    /// Whether the winch can have moved by `change` counts between two times.
     fn reaches(&self, from: MonoNs, to: MonoNs, change: i64) -> bool {
         self.within(to.since(from).as_secs_f64().max(0.0), change)
     }
 
-    /// True if the winch can have moved by `change` counts in `elapsed_s`. One count is allowed for rounding.
+    /// Whether the winch can have moved by `change` counts in `elapsed_s`. One more count is allowed for rounding.
     fn within(&self, elapsed_s: f64, change: i64) -> bool {
         (change as f64).abs() <= self.max_counts_per_s * (elapsed_s + SLACK_S) + 1.0
     }
@@ -211,7 +212,7 @@ impl CountTracker {
 mod tests {
     use super::*;
 
-    /// Three metres a second at 2000 counts a metre.
+    /// Maximum count rate: three metres per second at 2000 counts per metre.
     const FASTEST: f64 = 6000.0;
 
     fn at_ms(ms: u64) -> MonoNs {
@@ -228,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn narrow_counter_wraps_without_a_trace() {
+    fn narrow_counter_wraps_without_a_jump() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits8, FASTEST);
         let totals = take_all(&mut tracker, &[250, 6, 20, 250, 6]);
         assert_eq!(totals, [250, 262, 276, 250, 262].map(Some));
@@ -255,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn long_absence_is_no_way_back() {
+    fn restart_after_a_long_silence_keeps_the_last_length() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         tracker.take(at_ms(0), &counted(120_000));
         let totals = (0..5).map(|i| tracker.take(at_ms(60_000 + 20 * i), &counted(300 + i as i64)));
@@ -280,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_replugged_device_is_no_way_back() {
+    fn slow_reports_of_a_replugged_device_keep_the_last_length() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let counts = [20_000, 0, 100, 200, 300, 400];
         let totals = counts.iter().zip(0..).map(|(count, s)| tracker.take(at_ms(1000 * s), &counted(*count)));
@@ -315,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_are_added_once_and_lost_ones_reported() {
+    fn repeated_changes_are_added_once_and_lost_reports_are_counted() {
         let mut tracker = CountTracker::new(Counting::Delta, Width::Bits8, FASTEST);
         let mut take = |ms, sequence, count| {
             let report = Report { sequence: Some(sequence), ..counted(count) };

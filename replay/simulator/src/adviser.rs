@@ -3,9 +3,9 @@
 use crate::outbox::Message;
 use crate::pilot_advice::PilotAdvice;
 
-/// An on-board monitor whose advice the pilot gets.
+/// An on-board monitor whose advice the simulated pilot follows.
 pub trait Adviser: Send {
-    /// Processes a message that has crossed its line. Messages come in order.
+    /// Processes a message that has crossed its line. Messages must be passed in order of time.
     fn hear(&mut self, message: &Message<'_>);
 
     /// The advice since the last call, in order of time.

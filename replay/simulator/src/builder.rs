@@ -1,4 +1,4 @@
-//! Assembles a simulation. Effects add systems, components and random streams only here.
+//! Assembles a simulation. Only here can effects add systems, components and random streams.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::{Component, IntoScheduleConfigs, SystemSet, World};
@@ -14,20 +14,20 @@ use crate::random::Stream;
 use crate::sensing::{Mounted, Scenery};
 use crate::stages::Stage;
 
-/// Additions by an effect, for display.
+/// Additions of one effect to a simulation, for display.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Added {
-    /// Its name in scenes.
+    /// Name of the effect in scenes.
     pub effect: &'static str,
-    /// Its systems, each with its stage.
+    /// Systems of the effect, each with its stage.
     pub systems: Vec<(Stage, String)>,
-    /// Base systems that it replaces.
+    /// Base systems that the effect replaces.
     pub replaces: Vec<&'static str>,
-    /// Its components, each with the sensors that have it.
+    /// Components of the effect, each with the ids of the sensors that have the component.
     pub components: Vec<(String, Vec<String>)>,
-    /// Sources for which it draws random numbers.
+    /// Sources for which the effect draws random numbers.
     pub streams: Vec<String>,
-    /// Its change to the vehicle's trajectory before the dive begins, as text.
+    /// The effect's change to the vehicle's trajectory before the dive begins, as text.
     pub trajectory: Option<String>,
 }
 
@@ -37,12 +37,12 @@ struct Slot(usize);
 
 type Configs = ScheduleConfigs<ScheduleSystem>;
 
-/// The heads' programs, before the heads are switched on.
+/// The heads' programs, which effects may change before the heads are switched on.
 pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,
     pub(crate) effect: &'static str,
-    /// Sources for which random numbers were drawn, each with its effect.
+    /// Sources for which random numbers were drawn. Each one has the name of the effect that drew them.
     pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
 }
 
@@ -63,14 +63,14 @@ impl Programs<'_> {
     }
 }
 
-/// A simulation being assembled.
+/// A simulation that is being assembled.
 pub struct Builder<'a> {
     world: &'a mut World,
     facts: &'a Facts,
     seed: u64,
     entities: &'a [Entity],
     systems: Vec<(Stage, Option<u16>, Configs)>,
-    /// Effect being built; `None` for the base.
+    /// Index of the effect that is being built; `None` for the base.
     current: Option<usize>,
     added: Vec<Added>,
     base_systems: Vec<(Stage, String)>,
@@ -111,7 +111,7 @@ impl<'a> Builder<'a> {
         Stream::new(seed, effect, what)
     }
 
-    /// Records the sources for which the effect drew random numbers before it was built.
+    /// Records sources for which the effect drew random numbers before the simulation was assembled.
     pub(crate) fn has_drawn(&mut self, sources: impl Iterator<Item = String>) {
         if let Some(now) = self.now() {
             now.streams.extend(sources);
@@ -123,7 +123,7 @@ impl<'a> Builder<'a> {
         self.world.get::<Mounted>(*self.entities.get(source)?).map(|mounted| mounted.0)
     }
 
-    /// Gives a sensor a component.
+    /// Adds a component to a sensor.
     pub fn insert<C: Component>(&mut self, source: usize, component: C) {
         let Some(entity) = self.entities.get(source) else { return };
         self.world.entity_mut(*entity).insert(component);
@@ -136,7 +136,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds a system to a stage, after the existing ones.
+    /// Adds a system to a stage. It runs after the stage's existing systems.
     pub fn system<Marker>(
         &mut self,
         stage: Stage,
@@ -151,7 +151,7 @@ impl<'a> Builder<'a> {
         self.systems.push((stage, effect, system.into_configs()));
     }
 
-    /// The scene's tunnel and the vehicle's trajectory, for effects that change them; `what` describes the change.
+    /// The scene's tunnel and the vehicle's trajectory, for effects that change these. `what` describes the change.
     pub fn scenery(&mut self, what: String) -> Option<bevy_ecs::change_detection::Mut<'_, Scenery>> {
         if let Some(now) = self.now() {
             now.trajectory = Some(what);
@@ -159,30 +159,30 @@ impl<'a> Builder<'a> {
         self.world.get_resource_mut::<Scenery>()
     }
 
-    /// Duration of the dive, s, on the trajectory as changed by the effects so far.
+    /// Duration of the dive on the trajectory as changed by the effects so far, s.
     pub fn duration_s(&self) -> f64 {
         self.world.get_resource::<Scenery>().map_or(0.0, |scenery| scenery.trajectory.duration_s())
     }
 
-    /// Replaces a base system, which is then not added.
+    /// Replaces a base system. The base system is then not added.
     pub fn replace(&mut self, base: &'static str) {
         if let Some(now) = self.now() {
             now.replaces.push(base);
         }
     }
 
-    /// Whether an effect replaces a base system.
+    /// Whether any effect replaces a base system.
     pub(crate) fn replaced(&self, base: &str) -> bool {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }
 
-    /// Makes `effect` the current one.
+    /// Makes `effect` the current effect.
     pub(crate) fn effect(&mut self, effect: &'static str) {
         self.current = Some(self.added.len());
         self.added.push(Added { effect, ..Added::default() });
     }
 
-    /// Ends the effects: later additions belong to the base.
+    /// Ends the effects. Systems added later belong to the base.
     pub(crate) fn base(&mut self) {
         self.current = None;
     }
@@ -191,8 +191,9 @@ impl<'a> Builder<'a> {
         self.current.and_then(|index| self.added.get_mut(index))
     }
 
-    /// The schedule: all systems in one chain, by stage, base systems first; with `noting`, each is followed by a system
-    /// that records its changes.
+    /// Makes the schedule: all systems in one chain, by stage, with base systems first.
+    ///
+    /// If `noting` is set, each system is followed by a system that records its changes.
     pub(crate) fn schedule(self, noting: bool) -> (Schedule, Vec<Added>, Vec<(Stage, String)>) {
         let mut schedule = Schedule::default();
         schedule.set_executor(bevy_ecs::schedule::SingleThreadedExecutor::new());
@@ -216,7 +217,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The last two segments of a type's path, and the last one of its type parameter.
+/// The last two segments of a type's path, and the last segment of its type parameter.
 fn short_name(name: &str) -> String {
     let last = |path: &str, count: usize| {
         let parts: Vec<&str> = path.rsplit("::").take(count).collect();

@@ -1,4 +1,4 @@
-//! The clock of a simulated dive, and devices' clocks that drift.
+//! The clock of a simulated dive, and drifting clocks of devices.
 
 use bevy_ecs::prelude::Component;
 use headrace_geometry::math;
@@ -7,18 +7,19 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Start time of simulated dives.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
-/// Resolution of a rate. Drift is a whole number of these parts, so that no sum depends on rounding.
+/// Number of parts of a second that are the resolution of a drift. Drifts are whole numbers of parts, so that no sum
+/// depends on rounding.
 const PARTS: i128 = 1_000_000_000_000;
 
 /// A clock that is correct at the start and drifts at a constant rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Clock {
-    /// Excess of true time over shown time, in 1 / [`PARTS`] of shown time.
+    /// Excess of the true time over the shown time, in parts per [`PARTS`] of the shown time.
     longer: i128,
 }
 
 impl Clock {
-    /// A clock whose seconds are `ppm` millionths too long, so that its device samples late. Range: +/-10^5.
+    /// Creates a clock whose seconds are `ppm` millionths too long, so that its device samples late. Range: +/-10^5.
     pub(crate) fn slow_by_ppm(ppm: f64) -> Self {
         let per_ppm = (PARTS / 1_000_000) as f64;
         Self { longer: i128::from(math::round_to_i64(ppm.clamp(-1e5, 1e5) * per_ppm)) }
@@ -31,7 +32,7 @@ impl Clock {
         START + DurNs(i64::try_from(true_span).unwrap_or(i64::MAX))
     }
 
-    /// First time shown by the clock whose true time is at or after `at`.
+    /// First time shown by the clock for which the true time is at or after `at`.
     pub(crate) fn shows(&self, at: MonoNs) -> MonoNs {
         let true_span = i128::from(at.since(START).0);
         let near = (true_span * PARTS).div_euclid(PARTS + self.longer);

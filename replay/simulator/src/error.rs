@@ -6,30 +6,30 @@ use headrace_config::ConfigErrors;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// Error in keys of the scene or of its vehicle file.
+    /// An error in keys of the scene or of its vehicle file.
     #[error(transparent)]
     Config(#[from] ConfigErrors),
-    /// The trajectory leads through an obstacle.
+    /// An obstacle lies on the trajectory.
     #[error(
         "simulating the trajectory: after {after_s:.1} s, at chainage {chainage_m:.2} m, y {y_m:.2} m, z {z_m:.2} m, it leads \
          through {what}"
     )]
     Blocked {
-        /// Seconds after the start.
+        /// Time after the start, s.
         after_s: f64,
         /// Chainage, m.
         chainage_m: f64,
-        /// Left of the axis, m.
+        /// Distance to the left of the axis, m.
         y_m: f64,
-        /// Above the floor, m.
+        /// Height above the floor, m.
         z_m: f64,
         /// The obstacle.
         what: String,
     },
-    /// An effect that is inconsistent with the scene.
+    /// An effect is inconsistent with the scene.
     #[error("simulating {effect}: it {problem}")]
     Effect {
-        /// Its name.
+        /// Name of the effect.
         effect: &'static str,
         /// The inconsistency, as text.
         problem: String,

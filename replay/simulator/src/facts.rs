@@ -1,4 +1,4 @@
-//! Facts of a scene's vehicle and tunnel that effects depend on.
+//! Facts about the vehicle and the tunnel of a scene, for checking effects.
 
 use headrace_sampling::head::{HeadProgram, HeadSpec};
 use headrace_sampling::occlusion::Obstacle;
@@ -12,13 +12,13 @@ use crate::trajectory::Ground;
 pub struct Facts {
     /// The sensors, in the order of the vehicle file.
     pub sensors: Vec<SensorFacts>,
-    /// Parts of the vehicle that may occlude a head.
+    /// Parts of the vehicle that may hide a head's view.
     pub hull: Vec<Obstacle>,
     /// Whether a current would carry the vehicle.
     pub ground: Ground,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// The vehicle file's speed of sound, m/s.
+    /// Speed of sound in the vehicle file, m/s.
     pub sound_speed_mps: f64,
     /// Duration of the trajectory before effects change it, s.
     pub duration_s: f64,
@@ -27,18 +27,18 @@ pub struct Facts {
 /// A sensor of the vehicle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorFacts {
-    /// Its id.
+    /// Id of the sensor.
     pub id: String,
-    /// Its sense.
+    /// Quantity that the sensor measures.
     pub sense: Sense,
-    /// Specification of a head.
+    /// Specification, if the sensor is a head.
     pub head: Option<HeadSpec>,
-    /// Program of a head.
+    /// Program, if the sensor is a head.
     pub program: Option<HeadProgram>,
 }
 
 impl Facts {
-    /// Facts of a vehicle whose trajectory takes `duration_s`.
+    /// Collects the facts for a vehicle with a trajectory of `duration_s`.
     pub(crate) fn new(
         vehicle: &VehicleConfig,
         programs: &[HeadProgram],

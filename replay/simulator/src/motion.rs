@@ -8,11 +8,11 @@ use headrace_sensor::reading::Level;
 
 use crate::sensing::Scenery;
 
-/// The sample at `at` of a unit that samples every `period`.
+/// The sample at `at` of an inertial unit that samples every `period`.
 ///
-/// Rate and acceleration are means over the period, as in a unit that integrates between samples. Their sums give the
-/// whole change of attitude and velocity, even over a jerk between samples. At constant attitude and velocity they are
-/// zero to rounding.
+/// Rate and acceleration are means over the period, as in a unit that integrates between samples. The sums of the
+/// samples give the whole change of attitude and velocity, even over a jerk between samples. At constant attitude and
+/// velocity, rate and acceleration are zero to rounding.
 pub(crate) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) -> Inertia {
     let level = Rot::<Level, Tunnel>::from_roll_pitch_yaw(0.0, 0.0, truth.site.axis_yaw_rad);
     let attitude = |at| level * truth.pose(at).attitude * mount.rotation;
@@ -40,7 +40,7 @@ pub(crate) fn velocity(truth: &Scenery, mount: &Mount, at: MonoNs) -> Vec3<Senso
     attitude.inverse() * (place(late) - place(early)).scaled(1.0 / elapsed_s)
 }
 
-/// Mean turn rate from one attitude to the other over `elapsed`.
+/// Mean turn rate from attitude `before` to attitude `after` over `elapsed`.
 fn rate(before: Rot<Level, Sensor>, after: Rot<Level, Sensor>, elapsed: DurNs) -> Vec3<Sensor> {
     let [w, x, y, z] = (before.inverse() * after).wxyz();
     let axis = Vec3::new(x, y, z).scaled(if w < 0.0 { -1.0 } else { 1.0 });
@@ -48,12 +48,12 @@ fn rate(before: Rot<Level, Sensor>, after: Rot<Level, Sensor>, elapsed: DurNs) -
     if elapsed_s <= 0.0 {
         return Vec3::zero();
     }
-    // For small angles the ratio of the angle to the sine of its half tends to two.
+    // For small angles, the ratio of the angle to the sine of its half tends to two.
     let angle_per_sine = if sine > 1e-9 { 2.0 * math::atan2(sine, w.abs()) / sine } else { 2.0 };
     axis.scaled(angle_per_sine / elapsed_s)
 }
 
-/// The change of velocity from the first half to the second, divided by their mean length.
+/// Acceleration over two intervals: the change of mean velocity between them, divided by the mean of their lengths.
 fn acceleration(places: [Point3<Tunnel>; 3], times: [MonoNs; 3]) -> Vec3<Tunnel> {
     let [before, at, after] = times;
     let [p0, p1, p2] = places;

@@ -1,21 +1,21 @@
-//! Finds the changes of each measurement by each effect, by comparison.
+//! Finds the changes that each effect makes to each measurement, by comparison before and after.
 //!
-//! Effects needn't report their changes. This module is only active in a simulation with ground truth.
+//! Effects need not report their changes. This module is only active in a simulation with ground truth.
 
 use bevy_ecs::prelude::{Component, Query, ResMut, Resource};
 use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use crate::sensing::{Line, Samples, Source};
 
-/// Maximum number of figures of a measurement.
+/// Maximum number of figures in a measurement.
 const FIGURES: usize = 10;
 
-/// The figures of a measurement, by name.
+/// The figures of a measurement, with their names.
 pub(crate) trait Figures: Measurement {
-    /// Their names, with units.
+    /// Names of the figures, with units.
     const NAMES: &'static [&'static str];
 
-    /// Their values; NaN for missing ones.
+    /// Values of the figures; NaN for a missing value.
     fn figures(&self) -> [f64; FIGURES];
 }
 
@@ -82,32 +82,32 @@ impl Figures for Inertia {
     }
 }
 
-/// One change that an effect has made.
+/// One change made by an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Note {
-    /// The sensor.
+    /// Number of the sensor.
     pub source: u16,
-    /// The measurement, counted within the slice.
+    /// Number of the measurement within the slice.
     pub sample: usize,
-    /// The effect, by its index among those of the scene.
+    /// Index of the effect in the scene.
     pub effect: u16,
-    /// Figure that was changed.
+    /// Name of the changed figure.
     pub what: &'static str,
-    /// Value before, NaN if there was none.
+    /// Value before the change; NaN if there was none.
     pub from: f64,
-    /// Value after.
+    /// Value after the change.
     pub to: f64,
 }
 
-/// The slice's notes.
+/// The changes in the slice.
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Notes(pub(crate) Vec<Note>);
 
-/// The measurements as the last system left them.
+/// Copy of the measurements after the previous system.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Before<M: Measurement>(Vec<M>);
 
-/// The line as the last system left it.
+/// Copy of the line after the previous system.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct LineBefore(Line);
 
@@ -117,7 +117,8 @@ impl<M: Measurement> Default for Before<M> {
     }
 }
 
-/// The effect whose system has just run; `None` for a base system, whose output is the measurement itself.
+/// The effect with the system that has just run; `None` for a base system, since its output is the original
+/// measurement.
 #[derive(Debug, Clone, Copy)]
 struct After(Option<u16>);
 
@@ -125,7 +126,7 @@ type Noted<'a, M> = (&'a Source, &'a Samples<M>, &'a mut Before<M>);
 
 type AllNoted<'w, 's, M> = Query<'w, 's, Noted<'static, M>>;
 
-/// Records the changes since its last run.
+/// Returns a system that records the changes since the previous such system as changes by `effect`.
 #[expect(clippy::type_complexity, reason = "a system's signature is what it needs")]
 pub(crate) fn note(
     effect: Option<u16>,

@@ -1,4 +1,4 @@
-//! Messages of all lines in one order: (time, source, index on the line).
+//! Puts the messages of all lines into one order: (time, source, index on the line).
 
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::Direction;
@@ -8,9 +8,9 @@ use crate::sensing::Line;
 /// Bytes on the line of one source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Message<'a> {
-    /// Time at which they crossed the line.
+    /// Time at which the bytes crossed the line.
     pub at: MonoNs,
-    /// The source, in the order of the vehicle file.
+    /// Number of the source in the vehicle file.
     pub source: u16,
     /// Direction.
     pub direction: Direction,
@@ -20,14 +20,14 @@ pub struct Message<'a> {
 
 const NEVER: MonoNs = MonoNs(u64::MAX);
 
-/// Messages waiting for earlier ones of other lines.
+/// Messages that wait until all earlier messages of other lines are known.
 ///
-/// They are merged on demand, and their bytes stay in the devices' buffers.
+/// Messages are merged on demand. Their bytes stay in the devices' buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
-    /// One for each source, in order.
+    /// One lane for each source, in order.
     lanes: Vec<Lane>,
-    /// Time at which the next message of each lane is due; `NEVER` if none waits.
+    /// Time at which the next message of each lane is due; `NEVER` if the lane is empty.
     due: Vec<MonoNs>,
     /// Time before which messages are released.
     until: MonoNs,
@@ -38,18 +38,18 @@ pub(crate) struct Outbox {
 /// Messages waiting on one line.
 #[derive(Debug, Default)]
 struct Lane {
-    /// In order of time.
+    /// Messages in order of time.
     line: Line,
     next: usize,
 }
 
 impl Lane {
-    /// Time at which its next message is due.
+    /// Time at which the next message is due.
     fn due(&self) -> MonoNs {
         self.line.messages.get(self.next).map_or(NEVER, |message| message.at)
     }
 
-    /// Swaps in a slice's messages. The few that are still waiting are put before them.
+    /// Takes over the messages of a slice. The few messages that still wait stay in front of them.
     fn take(&mut self, line: &mut Line) {
         std::mem::swap(&mut self.line, line);
         self.line.put_first(line, self.next);
@@ -57,7 +57,7 @@ impl Lane {
         line.clear();
         // Drops messages without bytes.
         self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
-        // A reply may come after the next request.
+        // A reply may cross the line after the next request.
         if !self.line.messages.is_sorted_by_key(|message| message.at) {
             self.line.messages.sort_by_key(|message| message.at);
         }
@@ -65,7 +65,7 @@ impl Lane {
 }
 
 impl Outbox {
-    /// An outbox for this many sources.
+    /// Creates an outbox for this many sources.
     pub(crate) fn new(sources: usize) -> Self {
         let lanes = (0..sources).map(|_| Lane::default()).collect();
         Self { lanes, due: vec![NEVER; sources], ..Self::default() }
@@ -76,7 +76,7 @@ impl Outbox {
         self.front.is_some()
     }
 
-    /// The next message, once no earlier one can follow.
+    /// Removes and returns the next message, once no earlier message can follow.
     pub(crate) fn next(&mut self) -> Option<Message<'_>> {
         let front = self.front?;
         let lane = self.lanes.get_mut(front)?;
@@ -100,7 +100,7 @@ impl Outbox {
         Some(Message { at: message.at, source, direction: message.direction, bytes: line.bytes_of(message) })
     }
 
-    /// Takes a slice's messages from the line of `source`, and leaves the line empty.
+    /// Takes the messages of a slice from the line of `source`, and leaves the line empty.
     pub(crate) fn take(&mut self, source: usize, line: &mut Line) {
         if let Some(lane) = self.lanes.get_mut(source) {
             lane.take(line);
@@ -113,7 +113,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Releases everything; false if that was already done and no messages remain.
+    /// Releases all messages. Returns false if they were released before.
     pub(crate) fn finish(&mut self) -> bool {
         let more = self.until < NEVER;
         self.release(NEVER);
@@ -129,7 +129,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Updates the due time of each lane.
+    /// Updates the due time of each lane and finds the lane with the next released message.
     fn look(&mut self) {
         for (due, lane) in self.due.iter_mut().zip(&self.lanes) {
             *due = lane.due();

@@ -7,10 +7,10 @@ use headrace_geometry::time::MonoNs;
 pub struct PilotAdvice {
     /// Time of the advice.
     pub at: MonoNs,
-    /// The largest speed that meets the target, m/s; zero if no speed does, `None` if unknown.
+    /// Largest speed that meets the sampling target, m/s; zero if no speed does, `None` if unknown.
     pub v_max_mps: Option<f64>,
-    /// Whether to keep the vehicle stationary for a while.
+    /// Whether the pilot should keep the vehicle stationary for a while.
     pub stand: bool,
-    /// Missed stretches that haven't been cleared yet, first and last chainage, m.
+    /// First and last chainage of each missed stretch that has not been cleared yet, m.
     pub missed_m: Vec<[f64; 2]>,
 }

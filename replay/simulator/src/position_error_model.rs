@@ -1,8 +1,8 @@
 //! Expected position errors of a calm dive, computed by running the filter.
 //!
-//! A vehicle goes straight through its tunnel. Its devices are ideal except for their wire formats. The filter's
-//! covariance doesn't depend on the readings, so its errors between two passes apply to any calm dive. They agree
-//! within a tenth with simulated dives by data sheet (`tests/tests/sampling/calm.rs`).
+//! The vehicle moves straight through its tunnel, with devices that are ideal except for their wire formats. The
+//! filter's covariance does not depend on the readings, so the errors between two passes apply to any calm dive. They
+//! agree within 10 % with dives simulated from data sheets (`tests/tests/sampling/calm.rs`).
 
 use headrace_config::Document;
 use headrace_coverage::PassError;
@@ -21,20 +21,20 @@ use crate::files::FileLoader;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 
-/// Duration of the dive, s. After it the filter knows an inertial unit's biases as well as it ever will, to a few per
-/// cent.
+/// Duration of the dive, s. After this time, the uncertainty of an inertial unit's biases is within a few per cent of
+/// its final value.
 const CALM_S: f64 = 180.0;
-/// Speed of the dive, m/s, and the largest share of the tunnel that it covers.
+/// Speed of the dive, m/s, and the largest share of the tunnel covered by the dive.
 const CALM_MPS: f64 = 0.1;
 const MOST_SHARE: f64 = 0.5;
-/// Number of times between two passes that are evaluated, one per second.
+/// Number of evaluated times between two passes, one per second.
 const TIMES_S: u32 = 110;
 
-/// The expected errors of a vehicle, whose file `load` returns for its `name`.
+/// Expected position errors of a vehicle. `load` returns the vehicle file for its `name`.
 ///
-/// `None` if navigation gives no errors.
+/// `None` if the navigation gives no errors.
 ///
-/// Errors: the vehicle can't be simulated.
+/// Errors: the vehicle cannot be simulated.
 pub fn expected_errors(
     vehicle: &VehicleConfig,
     name: &str,
@@ -80,7 +80,8 @@ fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, Sce
     Ok(navigation)
 }
 
-/// Largest standard deviation of a hole's size around the wall, by the time between two passes.
+/// Largest standard deviation of the size of a hole between two passes, around the wall, for each time between the
+/// passes.
 fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig) -> Vec<[f64; 2]> {
     let Some(running) = navigation.running() else { return Vec::new() };
     let profile = &vehicle.tunnel.profile;

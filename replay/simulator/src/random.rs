@@ -1,6 +1,6 @@
 //! Counter-based random numbers: each effect has its own counter for each source and step.
 //!
-//! Naming an effect, or adding a sensor, therefore changes no other effect's draws.
+//! A new effect or sensor therefore leaves the draws of all other effects unchanged.
 //!
 //! Source: Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011 (Philox4x32-10); Wichura, "Algorithm
 //! AS 241", Applied Statistics 37, 1988 (normal quantiles).
@@ -12,20 +12,20 @@ const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: usize = 10;
 
-/// The random numbers of one effect for one source.
+/// Random numbers of one effect for one source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stream {
     key: [u32; 2],
 }
 
-/// The random numbers of one step: two per block.
+/// A block of two random numbers for one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Draw {
     words: [u32; 4],
 }
 
 impl Stream {
-    /// The stream of `effect` for `source`, by their names.
+    /// Returns the stream of the effect and the source with these names.
     pub fn new(seed: u64, effect: &str, source: &str) -> Self {
         let mut hash = Sha256::new();
         hash.update(seed.to_le_bytes());
@@ -46,7 +46,7 @@ impl Stream {
         self.block(step, 0)
     }
 
-    /// A further block of `step`, for effects that need more than two numbers.
+    /// A further block of `step`, for an effect that needs more than two numbers.
     pub fn block(self, step: u64, block: u64) -> Draw {
         let half = |value: u64| [(value & 0xFFFF_FFFF) as u32, (value >> 32) as u32];
         let ([a, b], [c, d]) = (half(step), half(block));
@@ -55,7 +55,7 @@ impl Stream {
 }
 
 impl Draw {
-    /// Two numbers between 0 and 1, both excluded, in steps of 2^-53.
+    /// Two uniform numbers between 0 and 1, both ends excluded, in steps of 2^-53.
     pub fn uniform(&self) -> [f64; 2] {
         let [a, b, c, d] = self.words;
         let number = |high: u32, low: u32| {
@@ -85,7 +85,7 @@ fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     counter
 }
 
-/// The quantile x of the standard normal distribution for probability `p`, 0 < p < 1; relative error 1e-15.
+/// Quantile of the standard normal distribution for probability `p`, 0 < p < 1. The relative error is 1e-15.
 pub(crate) fn normal_quantile(p: f64) -> f64 {
     let q = p - 0.5;
     if q.abs() <= 0.425 {
@@ -100,7 +100,7 @@ pub(crate) fn normal_quantile(p: f64) -> f64 {
 
 type Rational = [[f64; 8]; 2];
 
-/// Quotient of two polynomials, coefficients from the highest power.
+/// Quotient of two polynomials. Coefficients start with the highest power.
 fn ratio(r: f64, [above, below]: &Rational) -> f64 {
     let polynomial = |coefficients: &[f64; 8]| coefficients.iter().fold(0.0, |sum, c| sum * r + c);
     polynomial(above) / polynomial(below)
@@ -179,7 +179,7 @@ const FAR_TAIL: Rational = [
 mod tests {
     use super::*;
 
-    /// Known answers of the generator's authors (Random123, kat_vectors).
+    /// Known answers from the authors of the generator (Random123, kat_vectors).
     #[test]
     fn philox_gives_the_known_answers() {
         let all = u32::MAX;
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// Values to 16 digits, from mpmath at 50 digits.
+    /// Expected values have 16 digits and come from mpmath with 50 digits.
     #[test]
     fn normal_quantiles_are_accurate_in_the_middle_and_tails() {
         for (p, x) in [
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_follow_their_distribution() {
+    fn random_numbers_follow_their_distribution() {
         let stream = Stream::new(7, "some_effect", "head");
         let count = 100_000_u64;
         let (mut sum, mut squares, mut fourth, mut below) = (0.0, 0.0, 0.0, 0_u64);
@@ -226,7 +226,7 @@ mod tests {
             below += stream.at(step).uniform().iter().filter(|u| **u < 0.3).count() as u64;
         }
         let n = 2.0 * count as f64;
-        // Five standard deviations of each estimate.
+        // Tolerances are five standard deviations of each estimate.
         assert!((sum / n).abs() < 5.0 / math::sqrt(n));
         assert!((squares / n - 1.0).abs() < 5.0 * math::sqrt(2.0 / n));
         assert!((fourth / n - 3.0).abs() < 5.0 * math::sqrt(96.0 / n));

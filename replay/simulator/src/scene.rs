@@ -14,18 +14,18 @@ use crate::files::FileLoader;
 use crate::implied_effects::{self, Called, Choice, Described, Tables, Take};
 use crate::trajectory::{self, Ground, Trajectory};
 
-/// Upper bound of a dive's duration, s.
+/// Maximum duration of a dive, s.
 const LONGEST_S: f64 = 1e9;
 
 /// A parsed and checked scene.
 pub struct Scene {
-    /// Its display name.
+    /// Name for display.
     pub name: String,
-    /// Text of its vehicle file, which goes into the log.
+    /// Text of the vehicle file, which is written to the log.
     pub vehicle_text: String,
     /// The vehicle.
     pub vehicle: VehicleConfig,
-    /// Programs of its heads, in the order of the vehicle file.
+    /// Programs of the heads, in the order of the vehicle file.
     pub programs: Vec<HeadProgram>,
     /// Seed of the random numbers.
     pub seed: u64,
@@ -41,10 +41,10 @@ pub struct Scene {
 impl Scene {
     /// Parses and checks a scene.
     ///
-    /// `load` loads files that the scene or its vehicle file names; `seed` overrides the scene's.
+    /// `load` loads files that the scene or its vehicle file names. `seed` overrides the seed in the scene.
     ///
-    /// Errors: every key that is missing, unknown or out of range, in the scene and in its vehicle file; a trajectory
-    /// that leaves the tunnel; an effect that applies to nothing.
+    /// Errors: keys in the scene or in its vehicle file are missing, unknown or out of range (all are listed), the
+    /// trajectory leaves the tunnel, or an effect applies to nothing.
     pub fn parse(
         document: Document<'_>,
         kinds: &[&dyn DeviceKind],
@@ -54,7 +54,7 @@ impl Scene {
         Self::parse_taking(document, kinds, load, seed, None)
     }
 
-    /// Parses a scene like [`Scene::parse`]; `take` overrides the scene's.
+    /// Parses a scene like [`Scene::parse`]. `take` overrides the value in the scene.
     ///
     /// Errors: see [`Scene::parse`].
     pub fn parse_taking(
@@ -72,7 +72,7 @@ impl Scene {
         }
     }
 
-    /// Parses the scene's tables; errors of the vehicle file go into `of_vehicle`.
+    /// Parses the scene's tables. Errors of the vehicle file are added to `of_vehicle`.
     fn from_root(
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
@@ -112,7 +112,7 @@ impl Scene {
         let (design, length_m) = (&vehicle.tunnel.profile, vehicle.tunnel.length_m);
         let environment = root.part(|| Environment::parse(tunnel, design, length_m, text, load))?;
         let trajectory = root.part(|| trajectory::parse(&trajectory?, (design, length_m), seed, text))?;
-        // If the trajectory is wrong, effects are checked without it.
+        // If the trajectory is invalid, effects are checked without a trajectory.
         let known = trajectory.as_ref().map(|(trajectory, ground)| (*ground, trajectory.duration_s()));
         let (ground, duration_s) = known.unwrap_or((Ground::Water, LONGEST_S));
         let facts = Facts::new(&vehicle, &programs, ground, duration_s);
@@ -142,12 +142,12 @@ impl Scene {
         })
     }
 
-    /// Whether the pilot gets a monitor's advice ([`crate::Simulation::advised_by`]).
+    /// Whether the pilot follows a monitor's advice ([`crate::Simulation::advised_by`]).
     pub fn is_advised(&self) -> bool {
         self.trajectory.is_advised()
     }
 
-    /// Effects that the scene implies, and whether each is simulated.
+    /// Effects that the scene implies, with their fates.
     pub fn called(&self) -> &[Called] {
         &self.called
     }
@@ -157,12 +157,12 @@ impl Scene {
         self.active().map(|(kind, _)| kind.name()).collect()
     }
 
-    /// Leaves these effects out from now on, and restores those left out before.
+    /// Leaves these effects out from now on. Effects that were left out before are restored.
     pub fn leave_out(&mut self, names: &[&str]) {
         self.without = names.iter().map(|name| (*name).to_owned()).collect();
     }
 
-    /// The effects that are simulated.
+    /// The effects that are simulated, without those left out.
     pub(crate) fn active(&self) -> impl Iterator<Item = (&'static dyn EffectKind, &dyn Effect)> {
         let is_in = |kind: &dyn EffectKind| self.without.iter().all(|name| name != kind.name());
         self.effects
@@ -172,7 +172,7 @@ impl Scene {
             .map(|(kind, effect)| (*kind, effect.as_ref()))
     }
 
-    /// Facts that its effects are checked against.
+    /// Facts for checking effects.
     pub fn facts(&self) -> &Facts {
         &self.facts
     }

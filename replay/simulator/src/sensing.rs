@@ -19,25 +19,25 @@ use crate::trajectory::Trajectory;
 /// Interval at which the trajectory is checked, s.
 const CHECK_S: f64 = 0.5;
 
-/// The time span being simulated.
+/// Time span to simulate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Resource)]
 pub(crate) struct Slice {
-    /// Its beginning.
+    /// Start of the slice.
     pub from: MonoNs,
-    /// Its end, excluded.
+    /// End of the slice, excluded.
     pub until: MonoNs,
 }
 
-/// The tunnel, the vehicle's trajectory through it, the water.
+/// The tunnel, the vehicle's trajectory, and the water.
 #[derive(Debug, Clone, Resource)]
 pub struct Scenery {
-    /// Surroundings of the vehicle.
+    /// Tunnel around the vehicle.
     pub environment: Environment,
-    /// Its trajectory.
+    /// Trajectory of the vehicle.
     pub trajectory: Trajectory,
-    /// True water properties and levels.
+    /// True properties and levels of the water.
     pub site: Site,
-    /// Time at which the vehicle starts moving; if `None`, it moves from the dive's start.
+    /// Time at which the vehicle starts moving; `None` for the start of the dive.
     pub sets_out: Option<MonoNs>,
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct Source(pub u16);
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Mounted(pub Mount);
 
-/// The device's side of its wire.
+/// The simulated device at its end of the line.
 #[derive(Component)]
 pub(crate) struct Device<M: Measurement>(pub Box<dyn Emulator<M>>);
 
@@ -61,16 +61,16 @@ pub(crate) struct Head(pub HeadSpec);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Echosounder;
 
-/// The slice's measurements, in order of time.
+/// Measurements in the slice, in order of time.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Samples<M: Measurement> {
-    /// Number of the first sample, counted through the dive: the step for effects' random draws.
+    /// Number of the first sample, counted from the start of the dive. It is the step for the random draws of effects.
     pub first: u64,
     /// The measurements.
     pub list: Vec<M>,
 }
 
-/// Rays of the slice's soundings, one per sample.
+/// Rays of the soundings in the slice, one per sample.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Rays(pub Vec<Ray>);
 
@@ -85,29 +85,29 @@ pub(crate) struct Ray {
     pub hit: Option<Hit>,
 }
 
-/// The sonar's range at its setting, m of water, with a margin.
+/// Range of the sonar at its setting plus a margin, m.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Reach(pub f64);
 
-/// Messages of the slice on a line.
+/// Messages on a line in the slice.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Line {
-    /// The messages, in the order in which the device sent them.
+    /// The messages in the order in which the device sent them.
     pub messages: Vec<LineMessage>,
-    /// Their bytes.
+    /// Bytes of all messages.
     pub bytes: Vec<u8>,
 }
 
 /// A message on a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct LineMessage {
-    /// Time at which its first byte crosses the line.
+    /// Time at which the first byte crosses the line.
     pub at: MonoNs,
     /// Direction.
     pub direction: Direction,
-    /// Start and end of its bytes in those of the line.
+    /// Start and end of the message in [`Line::bytes`].
     pub bytes: (usize, usize),
-    /// The sample that it reports, counted within the slice.
+    /// Number of the reported sample within the slice.
     pub sample: usize,
 }
 
@@ -118,7 +118,7 @@ impl<M: Measurement> Default for Samples<M> {
 }
 
 impl<M: Measurement> Samples<M> {
-    /// The measurements with their step numbers.
+    /// The measurements, each with its step number.
     pub(crate) fn steps(&mut self) -> impl Iterator<Item = (u64, &mut M)> {
         (self.first..).zip(&mut self.list)
     }
@@ -152,7 +152,7 @@ impl Scenery {
 
     /// Checks that the trajectory stays in water.
     ///
-    /// Errors: the first point where it doesn't.
+    /// Errors: the first point outside the water.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
         let steps = math::floor_to_i64(self.trajectory.duration_s() / CHECK_S) + 1;
         let at = |step: i64| (step as f64 * CHECK_S).min(self.trajectory.duration_s());
@@ -182,13 +182,13 @@ impl Line {
         self.messages.push(LineMessage { at, direction, bytes: (from, self.bytes.len()), sample });
     }
 
-    /// The bytes of a message of this line.
+    /// The bytes of a message on this line.
     pub(crate) fn bytes_of(&self, message: &LineMessage) -> &[u8] {
         let (from, to) = message.bytes;
         self.bytes.get(from..to).unwrap_or_default()
     }
 
-    /// Inserts another line's messages, from number `first`, before its own.
+    /// Inserts the messages of another line, from number `first` on, before the messages of this line.
     pub(crate) fn put_first(&mut self, other: &Self, first: usize) {
         let bytes = &mut self.bytes;
         let moved = other.messages.iter().skip(first).map(|message| {
@@ -199,7 +199,7 @@ impl Line {
         drop(self.messages.splice(0..0, moved));
     }
 
-    /// Clears the slice's messages.
+    /// Clears the messages of the slice.
     pub(crate) fn clear(&mut self) {
         self.messages.clear();
         self.bytes.clear();

@@ -1,7 +1,8 @@
 //! A simulated dive.
 //!
 //! An ECS world has an entity for each sensor. Base systems implement the stages from polling the devices to encoding
-//! their messages; systems of the scene's effects run between them. The schedule runs once per slice of the dive.
+//! their messages. The systems of the scene's effects run between the base systems. The schedule runs once per slice of
+//! the dive.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
@@ -25,22 +26,22 @@ use crate::sensing::{
 use crate::stages::{self, AIM_HELD, Held, Stage};
 use crate::truth::{self, TruthRow};
 
-/// Length of a slice: long enough that the schedule's overhead is negligible.
+/// Length of a slice. At this length, the overhead of the schedule is negligible.
 const SLICE: DurNs = DurNs(1_000_000_000);
-/// Factor on a sonar's reach up to which walls are computed, for effects that shorten ranges.
+/// Ratio of the distance up to which walls are computed to a sonar's range. It allows for effects that shorten ranges.
 const REACH_SHARE: f64 = 1.25;
-/// Reach of an echosounder, m.
+/// Range of an echosounder, m.
 const ECHOSOUNDER_REACH_M: f64 = 100.0;
 
-/// A time that never comes.
+/// A time that is never reached.
 const NEVER: MonoNs = MonoNs(u64::MAX);
 
-/// Source of the requests to the devices.
+/// Origin of the requests to the devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Asker {
     /// Emulated hosts.
     Itself,
-    /// Emulated hosts, with the ground truth kept.
+    /// Emulated hosts. The simulation also keeps the ground truth.
     Noted,
     /// Real hosts.
     Hosts,
@@ -63,12 +64,12 @@ pub struct Simulation {
 impl Simulation {
     /// Sets up the scene's devices in its tunnel. Heads follow the scene's programs.
     ///
-    /// Errors: effects that contradict each other or the scene; a trajectory through a wall.
+    /// Errors: effects contradict each other or the scene, or the trajectory leads through a wall.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
         Self::assemble(scene, Asker::Itself)
     }
 
-    /// Creates a simulation whose devices serve hosts.
+    /// Creates a simulation with devices that serve real hosts.
     ///
     /// Hosts send bytes through [`Simulation::hear`], and [`Simulation::go_on`] advances the time. The vehicle is
     /// stationary until [`Simulation::set_out`].
@@ -126,14 +127,14 @@ impl Simulation {
 
     /// Gives the pilot this adviser.
     ///
-    /// It only has an effect if the trajectory is that of an advised pilot ([`Scene::is_advised`]). Without an adviser
-    /// such a pilot gets no advice.
+    /// An adviser has an effect only if the trajectory is that of an advised pilot ([`Scene::is_advised`]). Without an
+    /// adviser, an advised pilot gets no advice.
     #[must_use]
     pub fn advised_by(self, adviser: Box<dyn Adviser>) -> Self {
         Self { adviser: Some(adviser), ..self }
     }
 
-    /// End of the dive.
+    /// Time at the end of the dive.
     pub fn end(&self) -> MonoNs {
         self.end
     }
@@ -148,17 +149,17 @@ impl Simulation {
         self.world.get_resource::<Scenery>().map(|scenery| scenery.pose(at))
     }
 
-    /// The vehicle's surroundings and trajectory.
+    /// The tunnel, the trajectory and the water.
     pub fn scenery(&self) -> Option<&Scenery> {
         self.world.get_resource::<Scenery>()
     }
 
-    /// Systems, components and streams that each effect of the scene has added.
+    /// Systems, components and random streams added by each effect of the scene.
     pub fn added(&self) -> &[Added] {
         &self.added
     }
 
-    /// The base systems, except those that effects replace.
+    /// The base systems, without those that effects replace.
     pub fn base_systems(&self) -> &[(Stage, String)] {
         &self.base
     }
@@ -175,7 +176,7 @@ impl Simulation {
         Some(message)
     }
 
-    /// The next message, without removing it.
+    /// The next message, which stays in the simulation.
     pub fn peek_message(&mut self) -> Option<Message<'_>> {
         self.come().then(|| self.outbox.peek()).flatten()
     }
@@ -190,12 +191,14 @@ impl Simulation {
         true
     }
 
-    /// Ground truth of all measurements since the last call; empty without [`Simulation::with_truth`].
+    /// Ground truth of all measurements since the last call. Empty unless the simulation was created by
+    /// [`Simulation::with_truth`].
     pub fn take_truth(&mut self) -> Vec<TruthRow> {
         self.truth.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// Simulates a second of the dive and discards the messages, to get only the ground truth; false at the end.
+    /// Simulates a second of the dive for its ground truth and discards the messages. Returns false at the end of the
+    /// dive.
     pub fn advance(&mut self) -> bool {
         let more = self.next_slice();
         if let Some(adviser) = &mut self.adviser {
@@ -209,7 +212,7 @@ impl Simulation {
 
     /// Passes bytes from a host to device number `source` of the vehicle file.
     ///
-    /// `at` must not be before the time simulated so far.
+    /// `at` must not precede the end of the time simulated so far.
     pub fn hear(&mut self, source: usize, at: MonoNs, bytes: &[u8]) {
         let Some(entity) = self.entities.get(source).copied() else { return };
         hear::<Sounding>(&mut self.world, entity, at, bytes);
@@ -219,7 +222,7 @@ impl Simulation {
         hear::<GroundVelocity>(&mut self.world, entity, at, bytes);
     }
 
-    /// Starts the vehicle's movement at `at`. The dive ends with the trajectory.
+    /// Starts the vehicle's movement at `at`. The dive ends at the end of the trajectory.
     pub fn set_out(&mut self, at: MonoNs) {
         if let Some(mut scenery) = self.world.get_resource_mut::<Scenery>() {
             scenery.sets_out = Some(at);
@@ -228,8 +231,8 @@ impl Simulation {
         }
     }
 
-    /// Simulates up to `until`, for hosts. [`Simulation::next_message`] then returns the messages that crossed the
-    /// lines before it.
+    /// Simulates up to `until`, for real hosts. [`Simulation::waiting_message`] then returns the messages that crossed
+    /// the lines before `until`.
     pub fn go_on(&mut self, until: MonoNs) {
         let Some(slice) = self.world.get_resource::<Slice>() else { return };
         if until > slice.until {
@@ -237,12 +240,12 @@ impl Simulation {
         }
     }
 
-    /// The next message that has crossed its line, without simulating further.
+    /// The next message that has crossed its line. Does not simulate further.
     pub fn waiting_message(&mut self) -> Option<Message<'_>> {
         self.outbox.has_next().then(|| self.outbox.next()).flatten()
     }
 
-    /// Simulates the next slice; false at the end.
+    /// Simulates the next slice. Returns false at the end of the dive.
     fn next_slice(&mut self) -> bool {
         let Some(slice) = self.world.get_resource::<Slice>() else { return false };
         let soon = slice.until + self.slice;
@@ -254,7 +257,7 @@ impl Simulation {
             self.end = START + DurNs::from_secs_f64(scenery.trajectory.duration_s());
         }
         let Some(slice) = self.world.get_resource::<Slice>() else { return false };
-        // A measurement at the very end is included.
+        // The last slice includes a measurement at the very end of the dive.
         let last = self.end + DurNs(1);
         if slice.until >= last {
             return self.outbox.finish();
@@ -284,12 +287,12 @@ impl Simulation {
 
 #[cfg(test)]
 impl Simulation {
-    /// Sets another length of slices, which must not change any result.
+    /// Sets another length of slices. The length must not change any result.
     pub(crate) fn in_slices(self, slice: DurNs) -> Self {
         Self { slice, ..self }
     }
 
-    /// Removes the other sensors from the vehicle.
+    /// Removes all sensors except `source` from the vehicle.
     fn keep_only(&mut self, source: usize) {
         for (other, entity) in self.entities.iter().enumerate() {
             if other != source {
@@ -298,7 +301,7 @@ impl Simulation {
         }
     }
 
-    /// All measurements of a sensor to the end of the dive, without the other sensors.
+    /// All measurements of a sensor in the dive, simulated without the other sensors.
     pub(crate) fn measurements_of<M: Measurement>(mut self, source: usize) -> Vec<M> {
         self.keep_only(source);
         let mut all: Vec<M> = Vec::new();
@@ -312,7 +315,7 @@ impl Simulation {
     }
 }
 
-/// Passes bytes from a host to a device that measures `M`; an immediate reply goes to its line.
+/// Passes bytes from a host to a device that measures `M`. An immediate reply is put on the device's line.
 fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[u8]) {
     let mut entity = world.entity_mut(entity);
     let Ok((mut device, mut line)) = entity.get_components_mut::<(&mut Device<M>, &mut Line)>() else {
@@ -321,7 +324,7 @@ fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[
     device.0.hear(at, bytes, &mut |direction, at, bytes| line.send(at, direction, bytes, 0));
 }
 
-/// The scene's facts with the heads' programs as changed by effects, and the draws that this took.
+/// The scene's facts after effects have changed the heads' programs, and the random streams that the effects used.
 fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
     let (mut facts, mut drawn) = (scene.facts.clone(), Vec::new());
     for (kind, effect) in scene.active() {
@@ -374,7 +377,7 @@ fn spawn_device<M: Measurement>(world: &mut World, entity: Entity, device: Devic
     }
 }
 
-/// Adds systems for the vehicle's senses, except those that effects replace.
+/// Adds systems for the vehicle's sensors, except those that effects replace.
 fn add_base_systems(sim: &mut Builder<'_>) {
     let has = |sense: Sense| sim.facts().sensors.iter().any(|sensor| sensor.sense == sense);
     let [head, echosounder, depth, inertial, velocity, tether] =

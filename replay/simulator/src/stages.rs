@@ -1,4 +1,4 @@
-//! The stages of every simulation, from polling the devices to encoding their messages, with their base systems.
+//! The stages of every simulation, from polling the devices to encoding their messages, with the base systems.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -11,35 +11,35 @@ use crate::clock::Clock;
 use crate::motion::{motion, velocity};
 use crate::sensing::{Device, Echosounder, Head, Line, Mounted, Ray, Rays, Reach, Samples, Scenery, Slice};
 
-/// Name of the system [`aim_held`], for effects that replace it.
+/// Name of the system [`aim_held`]. Effects use the name to replace the system.
 pub(crate) const AIM_HELD: &str = "aim_held";
-/// Tolerance of a whole turn, radians.
+/// Tolerance for a whole turn, radians.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
-/// Order of processing in a slice. Within a stage, base systems come first, then effects in the order of
+/// Order of processing in a slice. Within a stage, base systems run first, then effects in the order of
 /// [`crate::effects::KINDS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
     /// Devices give the times and kinds of their measurements.
     Begin,
-    /// Heads turn: effects on angles.
+    /// Heads turn. Effects on angles act here.
     Turn,
-    /// Position and direction of each sonar.
+    /// Sonars get a position and a direction.
     Aim,
-    /// Hit of each beam.
+    /// Beams hit walls and objects.
     Look,
-    /// Range of each ping: effects on ranges.
+    /// Pings get a range. Effects on ranges act here.
     Hear,
-    /// Pressure, motion and cable, with their effects.
+    /// Other sensors get pressure, motion and cable length. Effects on these act here.
     Feel,
     /// Devices encode their measurements.
     Tell,
-    /// Effects on the lines.
+    /// Effects on the lines act here.
     Line,
 }
 
 impl Stage {
-    /// Its display name.
+    /// Name for display.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Begin => "begin",
@@ -54,7 +54,7 @@ impl Stage {
     }
 }
 
-/// For a head whose turn is a single picture: the pose of that picture, and the head's rotation since.
+/// State of a head that aims from one pose for a whole turn: that pose, and the rotation since then.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub(crate) struct Held {
     pose: Option<Pose>,
@@ -64,7 +64,7 @@ pub(crate) struct Held {
 }
 
 impl Held {
-    /// Whether a new turn, or sweep, begins with a ping at this angle.
+    /// Whether a new turn or sweep begins with a ping at this angle.
     fn begins(&mut self, angle_rad: f64) -> bool {
         // The first ping has no previous angle.
         let came_rad = if self.pose.is_some() { angle_rad - self.last_rad } else { 0.0 };
@@ -82,10 +82,10 @@ impl Held {
 
 type Beginning<'a, M> = (&'a mut Device<M>, &'a mut Samples<M>, Option<&'a Clock>);
 
-/// Polls the devices for the slice's measurements.
+/// Polls the devices for the measurements of the slice.
 ///
-/// A device with a drifting clock is polled up to that clock's time at the slice's end; the drift effect then sets the
-/// true times.
+/// A device with a drifting clock is polled up to the time that its clock shows at the end of the slice. The drift
+/// effect later sets the true times.
 pub(crate) fn begin<M: Measurement>(slice: Res<'_, Slice>, mut devices: Query<'_, '_, Beginning<'_, M>>) {
     for (mut device, mut samples, clock) in &mut devices {
         let samples = &mut *samples;
@@ -104,7 +104,7 @@ pub(crate) fn head_ray(pose: &Pose, mount: &Mount, angle_rad: f64) -> Ray {
 
 type Aimed<'a, Kind> = (&'a Samples<Sounding>, &'a Mounted, &'a mut Rays, Kind);
 
-/// Aims heads from the vehicle's pose at the beginning of their turn: one picture per turn.
+/// Aims heads from the vehicle's pose at the start of each turn, as if a whole turn were measured at one instant.
 pub(crate) fn aim_held(
     scenery: Res<'_, Scenery>,
     mut heads: Query<'_, '_, Aimed<'_, &mut Held>, With<Head>>,
@@ -135,7 +135,7 @@ pub(crate) fn aim_moving(
     }
 }
 
-/// Aims echosounders along their own x from the vehicle's pose.
+/// Aims each echosounder along its own x-axis from the vehicle's pose.
 pub(crate) fn aim_echosounders(
     scenery: Res<'_, Scenery>,
     mut sounders: Query<'_, '_, (&Samples<Sounding>, &Mounted, &mut Rays), With<Echosounder>>,
@@ -152,11 +152,11 @@ pub(crate) fn aim_echosounders(
 
 type Looking<'a> = (&'a mut Samples<Sounding>, &'a mut Rays, &'a Reach);
 
-/// Marks beams whose rays an effect casts instead of the base system.
+/// Marks beams with rays that are cast by an effect instead of the base system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct OwnBeam;
 
-/// Casts each beam as a ray; the range is that of its first hit.
+/// Casts each beam as a ray. The range is that of the first hit.
 pub(crate) fn look(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_>, Without<OwnBeam>>) {
     for (mut samples, mut rays, reach) in &mut sonars {
         for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {

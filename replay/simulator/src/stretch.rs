@@ -2,12 +2,12 @@
 
 use headrace_config::{ConfigError, Section};
 
-/// A stretch of the tunnel: chainages from `from_m` up to `to_m`, which is excluded.
+/// A stretch of the tunnel: chainages from `from_m` up to, but not including, `to_m`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stretch {
-    /// Start, m; minus infinity if it has none.
+    /// Start, m; minus infinity if the stretch has no start.
     pub from_m: f64,
-    /// End, m; infinity if it has none.
+    /// End, m; infinity if the stretch has no end.
     pub to_m: f64,
 }
 
@@ -15,9 +15,9 @@ impl Stretch {
     /// The whole tunnel.
     pub(crate) const ALL: Self = Self { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY };
 
-    /// Reads `from_m` and `to_m`; without one of them the stretch has no limit on that side.
+    /// Reads `from_m` and `to_m`. Without one of the keys, the stretch has no limit on that side.
     ///
-    /// Errors: outside the tunnel, or the end isn't beyond the start.
+    /// Errors: a limit is outside the tunnel, or the end is not beyond the start.
     pub(crate) fn read(table: &Section<'_>, length_m: f64) -> Result<Self, ConfigError> {
         let from_m = table.number("from_m", 0.0..=length_m)?;
         let to_m = table.number("to_m", 0.0..=length_m)?;
@@ -29,12 +29,12 @@ impl Stretch {
         Ok(stretch)
     }
 
-    /// Whether a chainage lies in it.
+    /// Whether a chainage lies in the stretch.
     pub(crate) fn has(&self, chainage_m: f64) -> bool {
         (self.from_m..self.to_m).contains(&chainage_m)
     }
 
-    /// Whether two stretches share a chainage.
+    /// Whether the stretch shares a chainage with another.
     pub(crate) fn meets(&self, other: &Self) -> bool {
         self.from_m < other.to_m && other.from_m < self.to_m
     }

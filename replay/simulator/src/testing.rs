@@ -21,7 +21,7 @@ pub(crate) const KINDS: [&dyn DeviceKind; 5] = [
 pub(crate) struct Dive {
     /// Keys of `[tunnel]`.
     pub(crate) tunnel: &'static str,
-    /// Sensors: id, plugin, further keys.
+    /// Id, plugin and further keys of each sensor.
     pub(crate) sensors: Vec<(&'static str, &'static str, String)>,
     /// More tables of the vehicle file.
     pub(crate) vehicle: &'static str,
@@ -46,18 +46,19 @@ pub(crate) struct Said {
 /// Result of a dive.
 #[derive(Debug, Clone)]
 pub(crate) struct Dived {
-    /// By time, then source.
+    /// Messages in order of time, then source.
     pub(crate) rows: Vec<TruthRow>,
     pub(crate) messages: Vec<Said>,
 }
 
 impl Dive {
-    /// One head in MEDIUM at 10 m, on the axis of a tunnel 6 m wide and 5 m high, at 0.2 m/s for ten seconds.
+    /// A dive of ten seconds at 0.2 m/s with one head, in the mode MEDIUM with a range of 10 m, on the axis of a tunnel
+    /// 6 m wide and 5 m high.
     pub(crate) fn with_head() -> Self {
         Self::with_heads(&[[0.0; 3]])
     }
 
-    /// Heads `sonar_0`, `sonar_1`, ... at these positions, all facing forward.
+    /// Adds heads `sonar_0`, `sonar_1`, ... at these positions, all facing forward.
     pub(crate) fn with_heads(places: &[[f64; 3]]) -> Self {
         let ids = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"];
         let head = |(place, id): (&[f64; 3], &'static str)| {
@@ -75,13 +76,13 @@ impl Dive {
         }
     }
 
-    /// An echosounder `ping` that looks to the left, twenty times a second.
+    /// Adds an echosounder `ping` that looks to the left and pings twenty times a second.
     pub(crate) fn with_sounder() -> Self {
         let sounder = ("ping", "ping1d", "angles_deg = [0, 0, 90]\ninterval_ms = 50".to_owned());
         Self { sensors: vec![sounder], ..Self::with_head() }
     }
 
-    /// The scene with these effects, parsed from the text of a scene file.
+    /// Parses the scene with these effects from the text of a scene file.
     pub(crate) fn scene(&self, effects: &str) -> Result<Scene, SceneError> {
         let mut vehicle =
             format!("target_m = 0.5\n[tunnel]\n{}\nlength_m = 5000\n{}\n", self.tunnel, self.vehicle);
@@ -99,7 +100,7 @@ impl Dive {
         Scene::parse(Document::new("scene.toml", &scene), &KINDS, &|_| Ok(vehicle.clone().into_bytes()), None)
     }
 
-    /// The simulation with these effects.
+    /// Creates the simulation with these effects.
     pub(crate) fn simulation(&self, effects: &str) -> Result<Simulation, SceneError> {
         let scene = self.scene(effects)?;
         let simulation = Simulation::with_truth(&scene)?;
@@ -122,7 +123,7 @@ impl Dive {
         Dived { rows, messages }
     }
 
-    /// Error text of a refused scene.
+    /// Text of the error for a refused scene.
     pub(crate) fn refusal(&self, effects: &str) -> String {
         match self.simulation(effects) {
             Ok(_) => panic!("{effects} was taken"),
@@ -139,7 +140,7 @@ impl Dive {
             assert!(usual.messages == other.messages, "slices of {slice_ms} ms: {effects}");
             assert_eq!(usual.rows.len(), other.rows.len(), "slices of {slice_ms} ms: {effects}");
             for (a, b) in usual.rows.iter().zip(&other.rows) {
-                // Compared as text, in which NaN equals NaN.
+                // Results are compared as text, in which NaN equals NaN.
                 assert_eq!(format!("{a:?}"), format!("{b:?}"), "slices of {slice_ms} ms: {effects}");
             }
         }
@@ -160,7 +161,7 @@ impl Dived {
     }
 }
 
-/// Asserts that a share of `of` trials is within five standard deviations of its probability.
+/// Asserts that the share of hits in `of` trials is within five standard deviations of its probability.
 pub(crate) fn assert_share(count: usize, of: usize, probability: f64) {
     let deviation = headrace_geometry::math::sqrt(probability * (1.0 - probability) / of as f64);
     let share = count as f64 / of as f64;

@@ -59,19 +59,19 @@ connect = "hid:1209:0001"
 counts_per_metre = 2000
 "#;
 
-/// Forwards, then back a little: 35 s.
+/// A trajectory that goes forwards and then a little backwards, 35 s.
 pub(crate) const LEGS: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 6\nspeed_mps = 0.2\n\
                                [[trajectory.legs]]\ndistance_m = 1\nspeed_mps = -0.2\n";
-/// A long leg: 640 s.
+/// A single long leg, 640 s.
 pub(crate) const LONG: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 64\nspeed_mps = 0.1\n";
-/// A pilot to 40 m.
+/// A pilot who goes to chainage 40 m.
 pub(crate) const PILOT: &str = "kind = \"pilot\"\nto_m = 40\nspeed_mps = 0.4\nstops_per_hour = 60\n\
                                 backs_per_hour = 60\nback_m = [0.5, 2]\nstop_s = [5, 10]\n";
 /// A trajectory given over ground.
 pub(crate) const WAYPOINTS: &str = "kind = \"waypoints\"\n[[trajectory.waypoints]]\nchainage_m = 2\n\
                                     [[trajectory.waypoints]]\nchainage_m = 6\nspeed_mps = 0.2\n";
 
-/// A message on a line: time, direction, bytes.
+/// A message on a line: time, direction, and bytes.
 pub(crate) type OnLine = (MonoNs, Direction, Vec<u8>);
 
 /// A scene for any effects.
@@ -104,12 +104,12 @@ impl Bench {
         Self { layout: "phase_shift", scene, unit: "imu" }
     }
 
-    /// The same bench with another seed.
+    /// The bench with another seed.
     pub(crate) fn seeded(self, seed: u64) -> Self {
         Self { scene: self.scene.replace("seed = 11", &format!("seed = {seed}")), ..self }
     }
 
-    /// The same bench with another name for the inertial unit, which then draws other random numbers.
+    /// The bench with another name for the inertial unit. The name changes the unit's random numbers.
     pub(crate) fn with_unit(self, unit: &'static str) -> Self {
         Self { unit, ..self }
     }
@@ -125,7 +125,7 @@ impl Bench {
         self.parse().and_then(|scene| Simulation::new(&scene)).unwrap()
     }
 
-    /// Error text if the dive is refused; empty if it isn't.
+    /// Text of the error if the dive is refused; empty if it is accepted.
     pub(crate) fn refusal(&self) -> String {
         let simulated = self.parse().and_then(|scene| Simulation::new(&scene));
         simulated.err().map(|why| why.to_string()).unwrap_or_default()
@@ -140,7 +140,7 @@ impl Bench {
         u16::try_from(self.parse().unwrap().facts.sensors.len()).unwrap()
     }
 
-    /// All measurements of a sensor, without the others.
+    /// All measurements of a sensor, simulated without the other sensors.
     pub(crate) fn run<M: Measurement>(&self, sensor: &str) -> Vec<M> {
         let scene = self.parse().unwrap();
         Simulation::new(&scene).unwrap().measurements_of(self.source(sensor))
@@ -167,7 +167,7 @@ impl Bench {
     }
 }
 
-/// Error text if the short dive with these effects is refused.
+/// Text of the error if the short dive with these effects is refused.
 pub(crate) fn refusal(effects: &str) -> String {
     Bench::turning(effects).refusal()
 }

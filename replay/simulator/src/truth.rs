@@ -1,4 +1,4 @@
-//! Ground truth: for each measurement the vehicle's pose, the point on the wall, and the effects' changes.
+//! Ground truth: for each measurement the vehicle's pose, the point on the wall, and the changes by effects.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
@@ -11,22 +11,22 @@ use crate::environment::Hit;
 use crate::notes::{Note, Notes};
 use crate::sensing::{Echosounder, Rays, Samples, Scenery, Source};
 
-/// One measurement.
+/// Ground truth of one measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruthRow {
     /// Time of the measurement.
     pub at: MonoNs,
-    /// The sensor, in the order of the vehicle file.
+    /// Number of the sensor in the vehicle file.
     pub source: u16,
-    /// Its sense.
+    /// Quantity that the sensor measures.
     pub sense: Sense,
-    /// Number of the measurement among this sensor's.
+    /// Number of the measurement among those of the sensor.
     pub number: u64,
     /// Pose of the vehicle.
     pub pose: Pose,
-    /// The vehicle's chainage, m.
+    /// Chainage of the vehicle, m.
     pub chainage_m: f64,
-    /// For a sonar, its ping.
+    /// The ping, if the sensor is a sonar.
     pub sounding: Option<SoundingTruth>,
     /// Changes by effects, in order.
     pub causes: Vec<Cause>,
@@ -39,14 +39,14 @@ pub struct SoundingTruth {
     pub measured: Sounding,
     /// Position of the sonar.
     pub origin: Point3<Tunnel>,
-    /// Direction of its beam's axis, a unit vector.
+    /// Direction of the beam's axis, a unit vector.
     pub direction: Vec3<Tunnel>,
-    /// Hit of the beam's axis, with the arc length there, m.
+    /// Hit of the beam's axis, and the arc length at the hit, m.
     pub wall: Option<(Hit, f64)>,
 }
 
 impl TruthRow {
-    /// For a sonar, the hit of its beam's axis, with the arc length there, m.
+    /// Hit of the beam's axis, and the arc length at the hit, m; `None` for a sensor other than a sonar.
     pub fn wall(&self) -> Option<(Hit, f64)> {
         self.sounding.and_then(|sounding| sounding.wall)
     }
@@ -59,20 +59,20 @@ impl SoundingTruth {
     }
 }
 
-/// A change that an effect has made.
+/// A change made by an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cause {
-    /// The effect, by its index among those of the scene.
+    /// Index of the effect in the scene.
     pub effect: u16,
-    /// Figure that was changed, with its unit.
+    /// Name of the changed figure, with its unit.
     pub what: &'static str,
-    /// Value before, NaN if there was none.
+    /// Value before the change; NaN if there was none.
     pub from: f64,
-    /// Value after.
+    /// Value after the change.
     pub to: f64,
 }
 
-/// Adds the slice's measurements, sensor by sensor, to `rows`.
+/// Adds the measurements of the slice to `rows`, sensor by sensor.
 pub(crate) fn collect(world: &mut World, entities: &[Entity], rows: &mut Vec<TruthRow>) {
     let mut notes =
         world.get_resource_mut::<Notes>().map(|mut notes| std::mem::take(&mut notes.0)).unwrap_or_default();

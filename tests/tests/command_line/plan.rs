@@ -227,7 +227,7 @@ fn impossible_plans_are_refused_with_the_reason() {
     --tunnel ceran --target 0.5 --mode hasty
         headrace: --mode hasty: expected all or one of slow, medium, fast, faster, fastest
     --tunnel ceran --target 0.5 --range 7
-        headrace: --range: 7 m is no range setting of the head; it has [1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100]
+        headrace: --range: 7 m is not a range setting of the head; it has [1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100]
     --tunnel ceran --speed 0
         error: invalid value '0' for '--speed <MPS>': expected a number from 0.001 to 5 m/s
     --tunnel ceran --speed=-0.2

@@ -6,14 +6,14 @@ use headrace_pictures::polyline::{Frame, Px};
 /// Space between a marker and its label, pixels.
 const APART_PX: f64 = 9.0;
 
-/// Distance from which on a line leads from the marker to its label, pixels.
+/// Distance beyond which a line connects a label to its marker, pixels.
 const FAR_PX: f64 = 14.0;
 
-/// A label with its place.
+/// A placed label.
 pub(super) struct Placed {
     pub(super) place: Px,
     pub(super) side: Side,
-    /// Start of a line to its marker; `None` if the label is right beside the marker.
+    /// Start of the line from the label to its marker; `None` if the label is right beside the marker.
     pub(super) led_from: Option<Px>,
 }
 
@@ -28,7 +28,7 @@ impl Taken {
         self.0.push(Frame { left: x - HALF_PX, top: y - HALF_PX, right: x + HALF_PX, bottom: y + HALF_PX });
     }
 
-    /// Finds and occupies a free place within a frame for a label beside a marker; `None` if there is none.
+    /// Finds and occupies a free place for a label beside a marker, within a frame; `None` if there is no room.
     pub(super) fn label(
         &mut self,
         [x, y]: Px,
@@ -42,7 +42,7 @@ impl Taken {
                 let by_px = match side {
                     Side::Right => APART_PX,
                     Side::Left => -APART_PX,
-                    // Directly above or below its marker.
+                    // A label in the middle is directly above or below its marker.
                     Side::Middle if step == 0.0 => continue,
                     Side::Middle => 0.0,
                 };

@@ -1,4 +1,4 @@
-//! Draws a trade: a chart for each scene, with error to the right and cost upwards, both logarithmic.
+//! Draws a trade: a chart for each scene, with the error on the x axis and the cost on the y axis, both logarithmic.
 
 mod labels;
 mod panel;
@@ -13,12 +13,12 @@ use crate::words::number;
 use panel::{BAND, CLEAR, PLATEAU, Panel};
 
 const WIDTH_PX: u32 = 1000;
-/// Height of a chart with its heading and the text below, pixels.
+/// Height of a chart, including its heading and the text below, pixels.
 const PANEL_PX: f64 = 470.0;
-/// Height of title and legend, pixels.
+/// Height of title and legend together, pixels.
 const TOP_PX: f64 = 96.0;
 const LINE_PX: f64 = 17.0;
-/// Maximum number of lines for settings that are left out.
+/// Maximum number of lines that name omitted settings.
 const MOST_LEFT_OUT: usize = 6;
 
 /// Draws a trade as SVG.
@@ -66,7 +66,7 @@ fn legend(canvas: &Canvas, trade: &Trade) {
     }
 }
 
-/// Lines that state settings not shown, and points shown elsewhere than they are.
+/// Lines that name omitted settings, and state which errors are drawn larger than they are.
 fn left_out(trade: &Trade) -> Vec<String> {
     let fits = |line: String| {
         let room_px = f64::from(WIDTH_PX) - 28.0;

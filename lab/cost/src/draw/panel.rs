@@ -18,11 +18,11 @@ pub(super) const BAND: Look = Look { colour: Colour(214, 214, 214), width_px: 9.
 /// Background of the plateau.
 pub(super) const PLATEAU: Colour = Colour(255, 240, 200);
 const WHISKER: Look = Look { colour: Colour(170, 170, 170), width_px: 0.9, ..look::T };
-/// Line from a marker to a label that isn't beside it.
+/// Line from a marker to a label that is not beside the marker.
 const LEADER: Look = Look { colour: Colour(110, 110, 110), width_px: 0.7, ..look::T };
-/// Errors within this ratio of the least error belong to the plateau.
+/// Maximum ratio of an error on the plateau to the least error.
 const SAME: f64 = 1.05;
-/// The least error shown, as a multiple of the oracle's own error.
+/// Smallest error drawn, as a multiple of the oracle's own error.
 pub(super) const CLEAR: f64 = 10.0;
 /// Margin around the outermost points, as a ratio.
 const ROOM: f64 = 1.25;
@@ -64,7 +64,7 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// Position of a point. Errors below the oracle's resolution are drawn at that resolution.
+    /// Position of a point. Errors below [`CLEAR`] times the oracle's error are drawn at that value.
     fn place(&self, point: &Point) -> [f64; 2] {
         [self.shown(point.error()), point.cost.middle]
     }
@@ -95,14 +95,15 @@ impl<'a> Panel<'a> {
         methods
     }
 
-    /// The front from small errors to large ones.
+    /// Points of the front, from small errors to large ones.
     fn front(&self) -> Vec<&'a Point> {
         let mut front: Vec<&Point> = self.points.iter().copied().filter(|point| point.on_front).collect();
         front.sort_by(|a, b| a.error().total_cmp(&b.error()).then(b.cost.middle.total_cmp(&a.cost.middle)));
         front
     }
 
-    /// Draws the background of a method's points that cost clearly more than others without less error.
+    /// Draws the background behind each method's plateau: points that cost clearly more than others without a smaller
+    /// error.
     fn plateau(&self, canvas: &Canvas, x: [f64; 2], y: [f64; 2]) {
         for method in self.methods() {
             self.plateau_of(method, canvas, x, y);
@@ -168,7 +169,7 @@ impl<'a> Panel<'a> {
             chart.canvas.marker(at, &look(point), size_px, point.is_default);
             taken.marker(at);
         }
-        // The most important ones come first. If there is no room left, the table on the page has the others.
+        // The most important labels come first. The table on the page lists the points whose labels find no room.
         let knee = crate::point::knee(&self.trade.points, self.scene, self.trade.resolution());
         let is_knee = |point: &Point| knee.is_some_and(|knee| std::ptr::eq(knee, point));
         let mut points = self.points.clone();

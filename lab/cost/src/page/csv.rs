@@ -2,7 +2,7 @@
 
 use crate::point::{Interval, Point, Trade};
 
-/// The table.
+/// Formats the points of a trade as CSV.
 pub(super) fn csv(trade: &Trade) -> String {
     let mut text =
         "scene,method,knob,value,number,shipped,on_front,seeds,error,unit,error_low,error_middle,error_high,\

@@ -1,6 +1,6 @@
 //! Writes results as files: a page in Markdown, JSON, and a CSV and a picture for each trade.
 //!
-//! All are made from [`Results`] alone, so a page that doesn't match its data can be detected.
+//! All files are made from [`Results`] alone, so a test can detect a page that does not match its data.
 
 mod csv;
 mod markdown;
@@ -20,7 +20,7 @@ pub const COST_VERSION: u32 = 1;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bars {
-    /// Quartiles of nine rounds, in files that don't state their bounds.
+    /// Quartiles of nine rounds. Files that don't state the meaning of their bounds have these.
     #[default]
     Quartiles,
     /// The 95 % interval of the median.
@@ -28,7 +28,7 @@ pub enum Bars {
 }
 
 impl Bars {
-    /// Description for the page.
+    /// Description for the page of the method.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Quartiles => "median of nine rounds measured in turns, with quartiles",
@@ -62,7 +62,7 @@ pub struct Results {
 impl Results {
     /// All files by name.
     ///
-    /// Errors: figures that JSON can't hold.
+    /// Errors: a figure that JSON can't represent.
     pub fn files(&self) -> Result<Vec<(String, String)>, serde_json::Error> {
         let mut files = vec![
             ("README.md".to_owned(), markdown::advice(self)),

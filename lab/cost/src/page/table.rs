@@ -40,7 +40,7 @@ pub fn table(trade: &Trade) -> String {
     text
 }
 
-/// The setting, without the knob's name if the method has the same name.
+/// The setting, without the knob's name if it equals the method's name.
 fn shown(point: &Point) -> String {
     if point.knob == point.method { point.value.clone() } else { words::setting(point) }
 }

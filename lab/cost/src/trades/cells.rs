@@ -2,7 +2,7 @@
 
 use headrace_monitor::run::Loop;
 
-/// Empty squares of a grid: chainage of the centre and edge, m.
+/// Empty squares of a grid, each as the chainage of its centre and its edge length, m.
 pub(super) struct Squares(Vec<[f64; 2]>);
 
 /// The largest empty square that ends at each cell of the grid over the passed wall.
@@ -13,8 +13,8 @@ pub(super) fn squares(dive: &Loop) -> Squares {
     let way = coverage.sections.sections_of(coverage.frontier.way());
     let (from_m, to_m) = (coverage.sections.bounds_m(way.start).0, coverage.sections.bounds_m(way.end).0);
     let mut squares = Vec::new();
-    // For each cell of the previous and the current row: the edge, in cells, of the largest empty square that ends
-    // there.
+    // For each cell of the previous and the current row: the edge length, in cells, of the largest empty square that
+    // ends at the cell.
     let (mut before, mut here): (Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new());
     let mut row_m = f64::NEG_INFINITY;
     for node in coverage.soundings.nodes_between(from_m, to_m) {
@@ -40,7 +40,7 @@ pub(super) fn squares(dive: &Loop) -> Squares {
 }
 
 impl Squares {
-    /// The edge of the largest square whose centre lies between two chainages, m; 0 if there is none.
+    /// Edge length of the largest square whose centre lies between two chainages, m; 0 if there is no such square.
     pub(super) fn largest_m(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|[at_m, _]| *at_m < x_m);
         let within = self.0.get(before(from_m)..before(to_m)).unwrap_or_default();

@@ -4,7 +4,7 @@ use headrace_geometry::math;
 
 use crate::point::{Error, Interval};
 
-/// Mean with its 95 % interval; for a single value, that value.
+/// Mean with its 95 % interval. A single value is returned without an interval.
 pub(super) fn spread(values: &[f64]) -> Option<Interval> {
     Interval::mean(values).or_else(|| Interval::quartiles(values))
 }

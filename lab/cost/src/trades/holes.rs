@@ -1,6 +1,6 @@
 //! Holes: the cost of finding the largest hole of a section exactly.
 //!
-//! It is compared with tolerances, the lattice's T, and counts of cells.
+//! The exact search is compared with a search with tolerances, with the lattice's T, and with counts of empty cells.
 
 use headrace_coverage::HoleFinder;
 use headrace_monitor::run::Loop;
@@ -23,22 +23,22 @@ use headrace_oracle::timed;
 /// Tolerances, m; 0.01 is a fiftieth of the target.
 const TOLERANCES_M: [f64; 6] = [1e-4, 1e-3, 0.01, 0.05, 0.2, 1.0];
 const QUICK_TOLERANCES_M: [f64; 2] = [0.05, 0.2];
-/// Edges of cells, m.
+/// Edge lengths of cells, m.
 const CELLS_M: [f64; 3] = [0.5, 0.1, 0.02];
 const QUICK_CELLS_M: [f64; 1] = [0.1];
 /// Lengths of sections, m, besides the shipped one.
 const SECTIONS_M: [f64; 2] = [0.05, 1.0];
 const QUICK_SECTIONS_M: [f64; 1] = [1.0];
-/// Range of a dive that is judged, away from its ends, m.
+/// Length of a dive's judged range, away from the dive's ends, m: quick, full.
 const JUDGED_M: [f64; 2] = [4.0, 16.0];
-/// Length of tunnel beyond the end of a dive, m. Without this limit, grids of fine cells would cover the whole tunnel.
+/// Length of tunnel beyond the end of a dive, m. A shorter tunnel keeps grids of fine cells small.
 const BEYOND_M: f64 = 30.0;
 const STRETCHES: u32 = 4;
 const NS: f64 = 1e9;
 /// Speed of all scenes, m/s.
 const SPEED_MPS: f64 = 0.1;
 
-/// Target of all scenes, m. A tenth of it decides, and a tenth of that counts as no difference.
+/// Target of all scenes, m. A tenth of the target decides, and a tenth of that tenth counts as no difference.
 const TARGET_M: f64 = 0.5;
 const DECIDES_M: f64 = TARGET_M / 10.0;
 const NOTHING_M: f64 = DECIDES_M / 10.0;
@@ -59,14 +59,14 @@ enum Setting {
 /// A scene to dive.
 struct Case {
     name: &'static str,
-    /// The scene, without the length of its only leg.
+    /// Text of the scene. The length of its only leg is a placeholder.
     text: String,
 }
 
 /// Effects of the field on four heads.
 ///
-/// The field scene of VITA 1 has them on one head. Here the pilot sways less, since with a target of half a metre more
-/// sway would miss it everywhere.
+/// The field scene of VITA 1 has these effects on one head. Here the pilot sways less: with more sway, every section
+/// would miss the target of half a metre.
 const FIELD: &str = "motion_within_turn = {}\nocclusion = {}\n\
     pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 2, period_s = 40 }\n\
     imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
@@ -85,7 +85,7 @@ fn cases() -> Result<[Case; 3], CostError> {
     Ok([
         Case { name: "ideal", text: own("", "motion_within_turn = {}\nocclusion = {}\n") },
         Case { name: "drop-outs", text: drop_outs },
-        // The vehicle file must state that the cable hangs.
+        // The vehicle file must state the slack of a hanging cable.
         Case { name: "field", text: own("[vehicle_changes]\nnavigation.slack_sd_m = 0.06\n", FIELD) },
     ])
 }
@@ -184,12 +184,12 @@ impl Dives {
     }
 }
 
-/// A case with its settings judged, ready to be timed.
+/// A case whose sections have been judged with each setting, ready to be timed.
 struct Prepared {
     name: &'static str,
     vehicle: VehicleConfig,
     recorded: Recorded,
-    /// The sections by setting and seed.
+    /// Judged sections by setting and seed.
     judged: Vec<Vec<Vec<Judged>>>,
 }
 
@@ -234,7 +234,7 @@ fn settings(effort: Effort) -> Vec<Setting> {
 }
 
 impl Setting {
-    /// Replays with this setting, and then restores the vehicle.
+    /// Calls `run` with the vehicle changed to this setting, and then restores the vehicle.
     fn with<T>(
         self,
         vehicle: &mut VehicleConfig,
@@ -269,9 +269,9 @@ impl Setting {
         })
     }
 
-    /// CPU time of a replay, and of one more search for the holes of all its sections, s.
+    /// CPU time of a replay, and of one additional search for the holes of all its sections, s.
     ///
-    /// Settings that need no search skip it.
+    /// For settings that need no search, the time of the search is subtracted from the replay's.
     fn cost_s(self, vehicle: &mut VehicleConfig, recorded: &Recorded) -> Result<[f64; 2], CostError> {
         self.with(vehicle, |vehicle| {
             let (ended, whole_s) = recorded.timed(vehicle)?;
@@ -321,10 +321,10 @@ impl Setting {
     }
 }
 
-/// Name of the figure that isn't an error.
+/// Name of the figure that is a time and not an error.
 const SEARCH: &str = "search or count alone";
 
-/// Judges the sections by a T of the lattice.
+/// Judges each section by a T of the lattice.
 fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) -> Vec<Judged> {
     let target_m = dive.report.target_m;
     let judged = |section: &JudgedSection| {
@@ -368,7 +368,7 @@ fn search(dive: &Loop, tolerance_m: f64) {
     }
 }
 
-/// A figure of a point by its name.
+/// Finds a figure of a point by its name.
 fn figure(point: &Point, name: &str) -> f64 {
     let found = point.errors.iter().find(|error| error.name.starts_with(name));
     found.map_or(f64::NAN, |error| error.interval.middle)

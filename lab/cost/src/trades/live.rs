@@ -22,14 +22,14 @@ use crate::words::number;
 use headrace_oracle::dive::{Recorded, armed};
 use headrace_oracle::{TruthError, timed};
 
-/// Reference settings: the finest ring and interval, and another lattice of rays that is coarser by a sixth.
+/// Reference settings: the finest ring and interval, and a second lattice of rays that is coarser by a sixth.
 const FINEST: Looks = Looks { ring: 3600, anew_m: Some(0.001) };
 const AS_FINE: Looks = Looks { ring: 3000, anew_m: Some(0.001) };
 /// Largest difference of speed that counts as equal, m/s.
 const RESOLUTION_MPS: f64 = 1e-5;
 const USUAL_TICK_MS: u32 = 20;
 
-/// A marker.
+/// A setting, which becomes a marker in the chart.
 struct Setting {
     method: &'static str,
     knob: &'static str,
@@ -42,7 +42,7 @@ struct Setting {
 
 /// Result of a dive.
 struct Ran {
-    /// Advised speed at each update, m/s; zero if there is none.
+    /// Advised speed at each update, m/s; zero if no speed was advised.
     v_max_mps: Vec<f64>,
     verdicts: Vec<(i64, &'static str)>,
     /// CPU time of each tick, s.
@@ -108,7 +108,7 @@ const PILOT: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"pilot\"\
     wander_pitch_deg = 2\nwander_roll_deg = 2\n";
 const PILOT_EFFECTS: &str =
     "[effects]\nmotion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\nrange_noise = { sd_m = 0.01 }\n";
-/// Half a metre of VITA 2, for profiles of many vertices.
+/// Half a metre with VITA 2, for profiles with many vertices.
 const SHORT: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 0.6\nspeed_mps = 0.1\n\
     [effects]\nmotion_within_turn = {}\n";
 
@@ -157,7 +157,7 @@ struct Prepared {
     markers: Vec<Marker>,
 }
 
-/// A setting as it is run, and its result.
+/// A setting with its vehicle and its results.
 struct Marker {
     setting: Setting,
     vehicle: VehicleConfig,
@@ -201,7 +201,8 @@ impl Prepared {
         Ok((Self { scene: name, seeds, recorded, markers }, size, v_mps))
     }
 
-    /// Prepares the design profile as `count` vertices on it, instead of its arcs.
+    /// Prepares a scene with the design profile given as vertices on its outline instead of arcs, for several numbers
+    /// of vertices.
     fn surveyed(inputs: &Inputs<'_>) -> Result<Self, CostError> {
         let scene = inputs.scene(SHORT, 1)?;
         let recorded = Recorded::of(&scene, &scene.vehicle)?;
@@ -231,7 +232,7 @@ impl Prepared {
 }
 
 impl Marker {
-    /// Share of a core that the loop takes.
+    /// Share of one core that the loop uses.
     fn cost(&self, recorded: &Recorded) -> Result<f64, CostError> {
         let pace = Pace { tick: tick(self.setting.tick_ms), speed: None };
         Ok(recorded.cpu_with_s(&self.vehicle, self.vehicle.navigation(), pace)? / recorded.duration_s())
@@ -297,12 +298,12 @@ impl Ran {
         Ok(Self { v_max_mps, verdicts, ticks_s, digest: report.digest.clone() })
     }
 
-    /// Difference of its advice from another's, update by update, rms, m/s.
+    /// Rms difference between the advised speeds of two runs, update by update, m/s.
     fn off_mps(&self, other: &Self) -> f64 {
         rms(self.v_max_mps.iter().zip(&other.v_max_mps).map(|(a, b)| a - b)).unwrap_or(0.0)
     }
 
-    /// Number of sections, per 100, with another verdict than the other run.
+    /// Number of sections, per 100, whose verdict differs from the other run's.
     fn other_verdicts(&self, other: &Self) -> f64 {
         let differing = self.verdicts.iter().zip(&other.verdicts).filter(|(a, b)| a != b).count();
         let differing = differing + self.verdicts.len().abs_diff(other.verdicts.len());
@@ -343,7 +344,7 @@ impl Against {
 
 const VERTICES: [u32; 5] = [10, 100, 1_000, 10_000, 100_000];
 
-/// A profile's file: `count` vertices at equal arc lengths.
+/// Text of a profile file with `count` vertices at equal arc lengths.
 fn outline(profile: &Profile, count: u32) -> String {
     let mut lines = String::new();
     for k in 0..count {
@@ -377,7 +378,8 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     left_out
 }
 
-/// For each scene, the savings by the coarsest ring and the longest tick, and why they aren't the default.
+/// For each scene, the savings with the coarsest ring and with the longest tick, and the reasons why neither is the
+/// default.
 fn reasons(points: &[Point]) -> Vec<String> {
     let mut scenes: Vec<&str> = Vec::new();
     for point in points.iter().filter(|point| point.method == "tick") {
@@ -385,7 +387,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
             scenes.push(&point.scene);
         }
     }
-    // For a method in a scene: the default, and the setting with the largest number.
+    // Finds the default of a method in a scene, and the setting with the largest number.
     let pair = |scene: &str, method: &str| {
         let of = || points.iter().filter(|point| point.scene == scene && point.method == method);
         let coarsest = of().max_by(|a, b| a.number.unwrap_or(0.0).total_cmp(&b.number.unwrap_or(0.0)))?;

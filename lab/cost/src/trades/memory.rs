@@ -1,4 +1,4 @@
-//! Cost of determinism and memory. These aren't choices, so there is no picture.
+//! Cost of determinism and memory. These properties are not a choice, so there is no picture.
 
 use std::hint::black_box;
 
@@ -18,7 +18,7 @@ const LENGTH_M: f64 = 7000.0;
 const PERIMETER_M: f64 = 28.0;
 /// Number of samples per metre of tunnel.
 const PER_M: u32 = 1_000;
-/// Metres of wall with samples that remain open, and of wall with samples that are packed.
+/// Metres of wall for which samples remain unpacked, and metres for which they are packed.
 const OPEN_M: u32 = 20;
 const PACKED_M: u32 = 160;
 /// Bytes of a sample before packing: chainage, arc length, step, visit, head.
@@ -62,8 +62,10 @@ fn arguments([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
     (0..ARGUMENTS).map(move |k| from + (to - from) * (f64::from(k) + 0.5) / f64::from(ARGUMENTS))
 }
 
-/// Share of arguments for which two functions differ in their bits, percent, and the largest difference in units of the
-/// last place.
+/// Compares two functions over a range of arguments.
+///
+/// Returns the percentage of arguments for which the results differ in any bit, and the largest difference in units of
+/// the last place.
 fn differing(ours: fn(f64) -> f64, others: fn(f64) -> f64, range: [f64; 2]) -> (f64, u64) {
     let (mut count, mut most) = (0_u32, 0);
     for argument in arguments(range) {
@@ -86,7 +88,7 @@ fn of_function(inputs: &Inputs<'_>, function: &Function) -> Result<Vec<String>, 
     Ok(row(&format!("libm: {name}"), lost, &costs))
 }
 
-/// Nanoseconds per piece for each setting; the work has `count` pieces.
+/// Nanoseconds per item for each setting; the work consists of `count` items.
 fn ns_each<T>(
     inputs: &Inputs<'_>,
     count: u32,
@@ -104,7 +106,7 @@ fn row(what: &str, lost: String, costs: &[Interval]) -> Vec<String> {
     vec![what.to_owned(), lost, ns(0), ns(1)]
 }
 
-/// Compares places in double precision with single precision.
+/// Compares places stored in double precision with places stored in single precision.
 fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     let places: Vec<[f64; 2]> =
         arguments([LENGTH_M - 100.0, LENGTH_M]).zip(arguments([0.0, PERIMETER_M])).map(Into::into).collect();
@@ -131,11 +133,11 @@ fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     Ok(row("places in double precision, not single", lost, &costs))
 }
 
-/// Compares samples packed to about four bytes with samples that stay open.
+/// Compares samples packed to about four bytes with unpacked samples.
 fn packing(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     let (half, packed) = (filled(PACKED_M / 2)?, filled(PACKED_M)?);
     let moved_m = packed.fidelity(0.0, 10.0).moved_m;
-    // The open part is the same in both.
+    // The unpacked part is the same in both stores.
     let [fewer, more] = [half.usage(), packed.usage()];
     let bytes = (more.bytes - fewer.bytes) as f64 / (more.kept - fewer.kept).max(1) as f64;
     let costs = in_turns(inputs.effort.rounds(), &[PACKED_M, OPEN_M], |metres| {
@@ -165,7 +167,7 @@ fn filled(metres: u32) -> Result<SampleStore, CostError> {
     Ok(store)
 }
 
-/// Adds a helix of one head's samples.
+/// Adds the helix of one head's samples.
 fn fill(store: &mut SampleStore, metres: u32) -> Result<(), CostError> {
     let step_m = [1.0 / f64::from(PER_M), PERIMETER_M / 120.0];
     for k in 0..metres * PER_M {
@@ -184,7 +186,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_functions_do_not_differ_and_others_by_their_difference() {
+    fn equal_functions_differ_by_0_ulp_and_shifted_ones_by_3_ulp() {
         assert_eq!(differing(math::sin, math::sin, [-7.0, 7.0]), (0.0, 0));
         let off = |x: f64| f64::from_bits(math::exp(x).to_bits() + 3);
         assert_eq!(differing(math::exp, off, [-1.0, 1.0]), (100.0, 3));

@@ -1,4 +1,4 @@
-//! The trades: a file with a function `measure` for each, listed here.
+//! The trades: one file for each, with a function `measure`. All are listed here.
 
 mod cells;
 mod figures;
@@ -14,10 +14,10 @@ use crate::error::CostError;
 use crate::point::{Given, Trade};
 use crate::scene::Inputs;
 
-/// Measures a trade; reports its progress to the second argument.
+/// Measures a trade; passes status messages to the second argument.
 pub type Measure = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Trade, CostError>;
 
-/// Makes a table of things that aren't a choice.
+/// Makes a table of properties that are not a choice.
 pub type Tabulate = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Given, CostError>;
 
 /// All trades by name, in the order of the page.
@@ -30,5 +30,5 @@ pub const TRADES: [(&str, Measure); 6] = [
     ("live", live::measure),
 ];
 
-/// Tables of things that aren't a choice, shown below the trades.
+/// Tables of properties that are not a choice, shown below the trades.
 pub const GIVEN: [Tabulate; 1] = [memory::tabulate];

@@ -35,24 +35,25 @@ const CHAINAGES_M: [u32; 3] = [16, 3000, 6900];
 const USUAL_HZ: u32 = 100;
 /// A tenth of the smallest shipped target, 0.5 m.
 const DECIDES_M: f64 = 0.05;
-/// Accuracy of the time at which a section is passed, s.
+/// Resolution of the time at which the vehicle passes a section, s.
 const MOMENT_S: f64 = 0.1;
-/// Length of a dive that is timed, s.
+/// Length of the part of a dive that is timed, s.
 const TIMED_S: f64 = 15.0;
-/// Differences below this count as equal.
+/// Difference of errors below which two settings count as equal, m.
 const RESOLUTION_M: f64 = 5e-4;
-/// A beam of more than a turn. No return of a head is then far enough from the one before to be used.
+/// A beam width of more than a turn. With it, navigation uses no return, since consecutive returns of a head are too
+/// close to each other.
 const NO_RETURNS_RAD: f64 = 1e9;
 
-/// A scene at a chainage.
+/// A scene that starts at a chainage.
 struct Place {
     name: String,
     text: String,
     vehicle: String,
     speed_mps: f64,
-    /// Duration of a turn of its heads, s.
+    /// Duration of a turn of the heads, s.
     turn_s: f64,
-    /// Whether all knobs are tried here, or only the methods.
+    /// Whether all settings are tried in this scene, or only the methods.
     all_knobs: bool,
 }
 
@@ -65,7 +66,7 @@ enum Way {
     Smoothed(Settings),
 }
 
-/// A marker.
+/// A setting, which becomes a marker in the chart.
 #[derive(Debug, Clone)]
 struct Setting {
     method: &'static str,
@@ -77,12 +78,12 @@ struct Setting {
     way: Way,
 }
 
-/// A dive with the input of navigation.
+/// A dive with the recorded input of navigation.
 struct Dived {
     recorded: Recorded,
     vehicle: VehicleConfig,
     hearing: Hearing,
-    /// The part that is timed.
+    /// The part of the input that is timed.
     timed: Hearing,
     by_cable: JudgedDive,
 }
@@ -160,14 +161,14 @@ fn four_heads(field: &str) -> String {
     four.replace(SLACK, "tether_slack = { reach_m = 0.03, period_s = 30 }")
 }
 
-/// The field scene with VITA 2 and four heads from a chainage on, with legs in metres and m/s.
+/// The field scene with VITA 2 and four heads from a chainage on. Legs are given in metres and m/s.
 ///
 /// Errors: the shipped scene isn't as expected.
 pub(super) fn field_of_four(from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostError> {
     moved(&four_heads(file("vita1-field.toml")?), from_m, legs)
 }
 
-/// The field scene at another chainage, with legs in metres and m/s.
+/// The field scene from another chainage on. Legs are given in metres and m/s.
 fn moved(text: &str, from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostError> {
     const START: &str = "start_m = 5\n";
     const LEG: &str = "[[trajectory.legs]]\ndistance_m = 130\nspeed_mps = 0.16\n";
@@ -180,7 +181,7 @@ fn moved(text: &str, from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostErr
     Ok(text.replace(START, &format!("start_m = {from_m}\n")).replace(LEG, &legs))
 }
 
-/// The settings for a place: methods and, if all knobs are tried, these.
+/// The settings for a scene: the methods and, if `all_knobs` is set, all values of the other settings.
 fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
     let deaf = Settings { return_step_rad: NO_RETURNS_RAD, ..*usual };
     let method = |value: &str, way, is_default| Setting {
@@ -228,15 +229,15 @@ fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
     settings
 }
 
-/// A place with its dives judged, ready to be timed.
+/// A scene with its dives judged, ready to be timed.
 struct Prepared {
     scene: String,
     settings: Vec<Setting>,
-    /// The distinct settings. A default is a marker of several lines, and is measured once.
+    /// The distinct settings. A default lies on the lines of several settings, but is measured once.
     unique: Vec<(u32, Way)>,
-    /// Number of seeds and errors of each of them.
+    /// Number of seeds, and errors, of each distinct setting.
     errors: Vec<(u32, Vec<Error>)>,
-    /// The first seed's dives, by rate of the inertial unit, Hz.
+    /// Dives of the first seed, by rate of the inertial unit, Hz.
     first: Vec<(u32, Dived)>,
 }
 
@@ -290,7 +291,7 @@ impl Prepared {
         found.map_or(f64::NAN, |(_, dived)| dived.cost_ns_per_s(way))
     }
 
-    /// Makes a marker; `cost` gives the cost of a distinct setting, which several markers may share.
+    /// Makes a marker. `cost` returns the cost of a distinct setting, which several markers may share.
     fn point(&self, setting: &Setting, cost: impl Fn(usize) -> Option<Interval>) -> Option<Point> {
         let which = self.unique.iter().position(|unique| *unique == (setting.rate_hz, setting.way))?;
         let ((seeds, errors), cost) = self.errors.get(which).zip(cost(which))?;
@@ -310,7 +311,7 @@ impl Prepared {
     }
 }
 
-/// Times the distinct settings of all places in turns.
+/// Times the distinct settings of all scenes in turns.
 fn points(inputs: &Inputs<'_>, prepared: &[Prepared]) -> Result<Vec<Point>, CostError> {
     let all: Vec<(&Prepared, (u32, Way))> =
         prepared.iter().flat_map(|place| place.unique.iter().map(move |unique| (place, *unique))).collect();
@@ -431,7 +432,7 @@ impl Dived {
         JudgedDive { report: report.clone(), truth: Arc::clone(truth), sections: sections.clone() }
     }
 
-    /// Time over which errors accumulate between neighbouring passes of a place, as in the filter, s.
+    /// Time over which errors accumulate between neighbouring passes of a place, s. The filter computes the same time.
     fn between_passes_s(&self, place: &Place) -> f64 {
         let heads = self.vehicle.heads();
         let passes_per_s = heads.len() as f64 / place.turn_s;
@@ -441,7 +442,7 @@ impl Dived {
     }
 }
 
-/// Mean delay between truly passing the end of a section and its flag, s; `None` without flags.
+/// Mean delay between passing the true end of a section and the section's flag, s; `None` without flags.
 fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
     let end_s = dive.report.dive.duration_s;
     let passed_s = |chainage_m: f64| {
@@ -462,8 +463,8 @@ fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
 
 /// Error of the references.
 ///
-/// One comparison is D_true by two references. The other compares true places with a taut cable's readings after
-/// emulator, bytes and decoder, which share only the trajectory with them.
+/// One comparison is between two computations of D_true. The other is between true places and the readings of a taut
+/// cable. The readings pass through emulator, bytes and decoder, and share only the trajectory with the true places.
 fn oracle(inputs: &Inputs<'_>, places: &[Place]) -> Result<OracleError, CostError> {
     let (mut hole_m, mut displacement_m) = (0.0_f64, 0.0_f64);
     for place in places.iter().filter(|place| place.all_knobs) {

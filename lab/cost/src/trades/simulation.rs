@@ -1,4 +1,4 @@
-//! Cost of a truer simulation: each effect left out, and the rays of a beam.
+//! Cost of a more accurate simulation: effects left out one by one, and the number of rays per beam.
 
 mod effects;
 
@@ -21,17 +21,17 @@ const RAYS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Default number of rays per beam.
 const USUAL_RAYS: u32 = 16;
 const MANY_RAYS: u32 = 1024;
-/// A second reference, as good as many rays, with rays at other places within the beam.
+/// Number of rays of a second reference. It is as good as [`MANY_RAYS`], with rays at other directions within the beam.
 const OTHER_RAYS: u32 = 769;
 /// A tenth of the smallest shipped target, 0.5 m.
 const DECIDES_M: f64 = 0.05;
-/// Smallest difference of D that matters, m; the simulation's own rounding is far below it.
+/// Smallest difference of D that counts, m. Rounding in the simulation is far smaller.
 const RESOLUTION_M: f64 = 1e-4;
-/// Fewest seeds: differences need a spread.
+/// Minimum number of seeds, since differences need a spread.
 const LEAST_SEEDS: u32 = 2;
-/// Maximum number of seconds of a dive that are timed; a slice of the simulation is a second.
+/// Number of seconds of a dive that are timed at most. A slice of the simulation is a second long.
 const TIMED_S: u32 = 8;
-/// Number of seeds for rays, since [`MANY_RAYS`] take long.
+/// Number of seeds when the number of rays is varied. It is small, since a simulation with [`MANY_RAYS`] takes long.
 const RAYS_SEEDS: u32 = 2;
 
 /// A scene and the effects that may be left out of it.
@@ -39,7 +39,7 @@ struct Stage {
     name: &'static str,
     text: String,
     effects: Vec<String>,
-    /// Sizes of its boulders by feature number, m.
+    /// Sizes of the scene's boulders by feature number, m.
     boulders_m: Vec<f64>,
 }
 
@@ -47,7 +47,7 @@ struct Stage {
 struct Figures {
     /// D and verdict of each section, by the section's start in millimetres.
     sections: Vec<(i64, Option<f64>, &'static str)>,
-    /// Numbers of the hit features.
+    /// Numbers of the features that beams hit.
     features_hit: Vec<u16>,
 }
 
@@ -127,15 +127,15 @@ const BOULDERS: u32 = 60;
 const SMALLEST_M: f64 = 0.02;
 const LARGEST_M: f64 = 0.8;
 
-/// Size of a boulder, m. Consecutive numbers have similar sizes.
+/// Size of a boulder, m. Boulders with consecutive numbers have similar sizes.
 fn boulder_m(number: u32) -> f64 {
     SMALLEST_M + (LARGEST_M - SMALLEST_M) * f64::from(number) / f64::from(BOULDERS - 1)
 }
 
 /// Table of a boulder.
 ///
-/// Chainage and arc length follow additive sequences of the golden ratio and the root of two, so that no boulder is
-/// near another of its size.
+/// Chainage and arc length follow additive sequences of the golden ratio and the root of two, so boulders of similar
+/// size are far from each other.
 fn boulder(number: usize, size_m: f64) -> String {
     let share = |by: f64| math::wrap(number as f64 * by, 1.0);
     let (chainage_m, arc_m) = (5.5 + 3.0 * share(0.618_033_988_7), 28.0 * share(0.414_213_562_4));
@@ -145,7 +145,7 @@ fn boulder(number: usize, size_m: f64) -> String {
 }
 
 const AMONG_BOULDERS: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.1\n";
-/// The effects of the shipped scene of boulders.
+/// The effects of the shipped scene `boulders`.
 const BOULDERS_EFFECTS: &str =
     "[effects]\nmotion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\nrange_noise = { sd_m = 0.01 }\n";
 /// VITA 2 with four heads along a plain stretch.
@@ -153,7 +153,8 @@ const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[tra
 
 /// The scenes in which the number of rays is varied.
 ///
-/// They are short, since a thousand rays take long. Both references are compared on the first one.
+/// The scenes are short, since a dive with a thousand rays per beam takes long. Both references are compared in the
+/// first scene.
 fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     let lengths = inputs.effort.pick(&[("field", 7.0)][..], &[("field", 20.0), ("boulders", 0.6)]);
     let mut of_field = vec![field(20)?];
@@ -176,7 +177,7 @@ fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
 /// The shipped field scene over `length_m` metres.
 fn field(length_m: u32) -> Result<Stage, CostError> {
     let text = file("vita1-field.toml")?.replace("distance_m = 130", &format!("distance_m = {length_m}"));
-    // At the speed that its vehicle file plans.
+    // The speed is the one that the scene's vehicle file plans.
     let planned = text.replace("speed_mps = 0.16", "speed_mps = 0.197");
     if planned == text {
         let why = "the shipped scene has another speed than this trade changes".to_owned();
@@ -187,7 +188,7 @@ fn field(length_m: u32) -> Result<Stage, CostError> {
     Ok(Stage { name: "field", text, effects, boulders_m: Vec::new() })
 }
 
-/// A marker with known errors and the scene to time: a point without its cost.
+/// A point whose errors are known and whose cost is still to be timed, with the scene to time.
 struct Prepared {
     point: Point,
     scene: Scene,
@@ -196,7 +197,7 @@ struct Prepared {
 }
 
 impl Prepared {
-    /// Prepares timing of the first seed's scene.
+    /// Prepares to time the scene of the first seed.
     fn of(inputs: &Inputs<'_>, text: &str, point: Point) -> Result<Self, CostError> {
         let scene = inputs.scene(text, 1)?;
         let recorded = Recorded::of(&scene, &scene.vehicle)?;
@@ -205,7 +206,7 @@ impl Prepared {
         Ok(Self { point, scene, returns })
     }
 
-    /// CPU time of a simulation, ns per sonar return.
+    /// CPU time of simulating, ns per sonar return.
     fn cost_ns(&self) -> Result<f64, CostError> {
         let mut simulation = Simulation::new(&self.scene)?;
         let ((), cpu_s) = timed(|| (0..TIMED_S).take_while(|_| simulation.advance()).for_each(drop));
@@ -213,7 +214,9 @@ impl Prepared {
     }
 }
 
-/// Times all markers of all scenes in turns. The savings of leaving an effect out are relative to the whole scene.
+/// Times all settings of all scenes in turns.
+///
+/// The time saved by leaving an effect out is relative to the scene with all effects.
 fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
     let costs = in_turns(inputs.effort.rounds(), &prepared, Prepared::cost_ns)?;
     let mut whole = f64::NAN;
@@ -229,7 +232,7 @@ fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, Co
     Ok(points)
 }
 
-/// The line of effects left out one by one. The default leaves none out and comes first.
+/// Method name of the points with one effect left out. The default leaves none out and comes first.
 const LEFT_OUT: &str = "left out";
 
 fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prepared>, CostError> {
@@ -260,7 +263,7 @@ fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prep
     Ok(prepared)
 }
 
-/// The markers for numbers of rays, and the difference between two references, m.
+/// Makes the points for numbers of rays; also returns the difference between the two references, m.
 fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepared>, f64), CostError> {
     let rays = || [MANY_RAYS].into_iter().chain(RAYS);
     let text = |rays: u32| Ok((rays.to_string(), effects::with_rays(&stage.text, rays)?));
@@ -286,13 +289,13 @@ fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepar
     if stage.name != "field" {
         return Ok((prepared, 0.0));
     }
-    // One dive shows the difference between two references.
+    // One dive is enough to find the difference between the two references.
     let others = [MANY_RAYS, OTHER_RAYS].map(text).into_iter().collect::<Result<Vec<_>, CostError>>()?;
     let (references, _) = self::differences(inputs, &others, 1)?;
     Ok((prepared, references.get(1).map_or(f64::NAN, Differences::change_m)))
 }
 
-/// For each seed, the effect of a change of the scene on the results.
+/// Changes of the results by a change of the scene, one value per seed.
 #[derive(Default)]
 struct Differences {
     hole_m: Vec<f64>,
@@ -305,7 +308,7 @@ impl Differences {
         spread(&self.hole_m).map_or(f64::NAN, |change| change.middle.abs())
     }
 
-    /// The errors: first the size of the mean change, with the interval of its size; then the change itself.
+    /// The errors: first the magnitude of the mean change of D with an interval; then the changes with their signs.
     fn errors(&self) -> Vec<Error> {
         let size = spread(&self.hole_m).map(|Interval { low, middle, high }| Interval {
             low: if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) },
@@ -322,9 +325,9 @@ impl Differences {
     }
 }
 
-/// Dives each text with the same seeds and compares it with the first text.
+/// Simulates the scene of each text with the same seeds, and compares each dive with the dive of the first text.
 ///
-/// Also returns the features hit in each dive.
+/// Also returns the features hit in the dives of the first seed.
 fn differences(
     inputs: &Inputs<'_>,
     texts: &[(String, String)],
@@ -349,10 +352,10 @@ fn differences(
     Ok((differences, hits))
 }
 
-/// Numbers of the hit features, dive by dive.
+/// Numbers of the hit features, by dive.
 type Hits = Vec<Vec<u16>>;
 
-/// The smallest boulder hit and the largest missed, m; empty if there are none.
+/// Sizes of the smallest boulder hit and the largest boulder missed, m; empty if the scene has no boulders.
 fn boulders_hit(sizes_m: &[f64], hits: &Hits) -> Vec<Error> {
     let by_number = || (0_u16..).zip(sizes_m);
     let (mut smallest_m, mut missed_m) = (Vec::new(), Vec::new());
@@ -367,7 +370,7 @@ fn boulders_hit(sizes_m: &[f64], hits: &Hits) -> Vec<Error> {
     errors.into_iter().flatten().collect()
 }
 
-/// Compares section by section; both dives are of one vehicle on one trajectory.
+/// Compares two dives section by section. Both dives have the same vehicle and trajectory.
 fn compare(whole: &Figures, other: &Figures, differences: &mut Differences) {
     let (mut changes_m, mut count, mut passed, mut differing) = (Vec::new(), 0.0, 0.0, 0.0);
     for (start, hole_m, verdict) in &other.sections {
@@ -402,7 +405,7 @@ impl Figures {
     }
 }
 
-/// Numbers of the features that beam axes met and whose returns were detected.
+/// Numbers of the features that beam axes hit with a detected return.
 fn features_hit(scene: &Scene) -> Result<Vec<u16>, CostError> {
     let mut simulation = Simulation::with_truth(scene)?;
     let mut hit = Vec::new();
@@ -442,7 +445,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     left_out
 }
 
-/// A change of D below this counts as none, m.
+/// Change of D below which D counts as unchanged, m.
 const UNCHANGED_M: f64 = 0.01;
 
 /// Reasons for the default number of rays and for keeping all effects.
@@ -486,7 +489,7 @@ fn advice(points: &[Point]) -> String {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
-    // Where a whole dive has no D, its change is no number.
+    // A dive without any D gives no finite change.
     let is_known = |point: &&Point| figure(point, "change of D").is_finite();
     let most = left_out().filter(is_known).max_by(|a, b| a.error().total_cmp(&b.error()));
     let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);

@@ -1,6 +1,6 @@
 //! The price of confidence in hours.
 //!
-//! It depends on the standard deviation of the displacement between passes, and on the required confidence.
+//! The price depends on the standard deviation of the displacement between passes, and on the required confidence.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::margin::ExpectedErrors;
@@ -17,19 +17,19 @@ use crate::words::number;
 use headrace_oracle::dive::Recorded;
 
 const VEHICLE: &str = "vita2-4.toml";
-/// The mode and the target, m, of its heads.
+/// The mode and the target, m, of the heads.
 const MODE: &str = "fast";
 const TARGET_M: f64 = 0.5;
 /// Length of the tunnel, m.
 const LENGTH_M: f64 = 7000.0;
 /// Standard deviations of the displacement between passes, m.
 const SIGMAS_M: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.03, 0.04, 0.06];
-/// Standard deviations between hole and target for a verdict.
+/// Required difference between hole and target for a verdict, in standard deviations.
 const CONFIDENCES: [u32; 3] = [1, 2, 3];
 const USUAL: u32 = 2;
-/// Ratio of the speed in the second half of a dive to the planned speed, so that some sections must fail.
+/// Ratio of the speed in the second half of a dive to the planned speed. It makes some sections fail.
 const HURRY: f64 = 1.2;
-/// Times between two passes for which a standard deviation is stated, s: all of them.
+/// Range of times between two passes for which the standard deviation is stated, s. The range covers all passes.
 const TIMES_S: [f64; 2] = [0.001, 1000.0];
 
 /// Measures the trade.
@@ -98,7 +98,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     left_out
 }
 
-/// The largest speed at which sections pass, m/s.
+/// The largest speed at which sections still pass, m/s.
 fn speed_mps(planner: &Planner, mode: usize, confidence: u32, sigma_m: f64) -> Result<f64, CostError> {
     let by_time = TIMES_S.map(|time_s| [time_s, sigma_m]).to_vec();
     let errors = ExpectedErrors { confidence_sd: f64::from(confidence), by_time };
@@ -132,11 +132,12 @@ fn point(
     })
 }
 
-/// Errors of verdicts at `confidence` sigmas in field dives, half at a speed and half faster.
+/// Errors of verdicts at `confidence` standard deviations in field dives. The first half is driven at `speed_mps`, the
+/// second half faster.
 fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Error>, CostError> {
     let half_m = inputs.effort.pick(8.0, 15.0);
     let legs = [(half_m, speed_mps), (half_m, HURRY * speed_mps)];
-    // Phases are computed for a speed to a millimetre per second.
+    // Head phases are computed for a speed rounded to a millimetre per second.
     let changes = format!("[vehicle_changes]\nheads.planned_speed_mps = {speed_mps:.3}\n");
     let text = field_of_four(16, &legs)?.replace("[trajectory]", &format!("{changes}[trajectory]"));
     let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
@@ -149,7 +150,7 @@ fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Err
     Ok(verdicts::errors(&dives, TARGET_M))
 }
 
-/// Reasons for verdicts at two sigmas although one is cheaper.
+/// Reasons for requiring two standard deviations, although one is cheaper.
 fn reasons(points: &[Point]) -> Vec<String> {
     let passed = |confidence: u32| {
         let is = |point: &&Point| point.method == format!("{confidence} sigma");

@@ -1,7 +1,7 @@
 //! Survey: the cost of a finer target in hours of diving.
 //!
-//! Hours and T come from the functions of `plan`. They are shown beside the largest hole of a simulated dive at the
-//! planned speed, with heads phased for that speed. The plan is kept if that hole is smaller than T.
+//! Hours and T come from the functions of `headrace plan`. They are shown beside the largest hole of a simulated dive
+//! at the planned speed, with heads phased for that speed. A dive keeps its plan if the largest hole is smaller than T.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::plan::{Planner, Question};
@@ -26,20 +26,20 @@ const QUICK_FEW_TARGETS_M: [f64; 1] = [SHIPPED_M];
 const SHIPPED_M: f64 = 0.5;
 /// The shipped mode of the vehicle whose modes are compared.
 const SHIPPED_MODE: &str = "fast";
-/// Positions of a vehicle off the middle, left and up, as multiples of its drift.
+/// Lateral positions of the vehicle relative to the middle, left and up, as multiples of its drift.
 const PLACES: [[f64; 2]; 5] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 0.0]];
 /// Speed of the way back, during which nothing is inspected, m/s.
 ///
-/// It is the speed of the demonstration's pilot when in a hurry, rounded.
+/// The value is the rounded speed of the demonstration's pilot when in a hurry.
 const WAY_BACK_MPS: f64 = 0.3;
 /// Share of the tunnel that is passed a second time.
 const AGAIN_SHARE: f64 = 0.1;
-/// Length of the sections in which both references are compared, m, and their number.
+/// Length, m, and number of the sections in which both references are compared.
 const STRETCH_M: f64 = 0.25;
 const STRETCHES: u32 = 4;
-/// Smallest error claimed for the oracle, m: both references are computed to that.
+/// Smallest error claimed for the oracle, m. Both references are computed to this accuracy.
 const LEAST_M: f64 = 1e-9;
-/// Names of the compared vehicles, with their files. The modes, layouts and drifts compared are those of the last one.
+/// Names of the compared vehicles, with their files. Modes, layouts and drifts are compared for the last vehicle.
 const VEHICLES: [(&str, &str); 4] = [
     ("VITA 1, one head", "vita1.toml"),
     ("VITA 2, two heads", "vita2-2.toml"),
@@ -47,12 +47,12 @@ const VEHICLES: [(&str, &str); 4] = [
     ("VITA 2, four heads", "vita2-4.toml"),
 ];
 
-/// Scene of the vehicles.
+/// Name of the scene in which the vehicles are compared.
 const HEADS: &str = "heads, each vehicle in its fastest mode";
 
-/// A vehicle with changes.
+/// A vehicle with its changes.
 struct Way<'a> {
-    /// Name of its line in the picture.
+    /// Name of the vehicle's line in the picture.
     method: String,
     file: &'a str,
     mode: Option<&'static str>,
@@ -140,7 +140,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
     reasons
 }
 
-/// Text about plans that a dive doesn't keep.
+/// Sentence about plans that the dives don't keep.
 fn broken(points: &[Point]) -> Option<String> {
     let is_broken = |point: &&Point| {
         point.errors.get(1).is_some_and(|error| error.unit == "m" && error.interval.middle > point.error())
@@ -249,7 +249,7 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// Adds a point with the true holes of its dives; the tunnel is `length_m` long.
+    /// Adds a point with the true holes of its dives. The tunnel is `length_m` long.
     fn point(&mut self, planned: &Planned<'_>, holes: &[TrueHole], length_m: f64) {
         let Planned { scene, way, mode, target_m, speed_mps, there_h } = *planned;
         let back_h = length_m / WAY_BACK_MPS / 3600.0;
@@ -305,19 +305,19 @@ struct Planned<'a> {
     there_h: f64,
 }
 
-/// The largest hole of a dive, m, and the error of both references if compared.
+/// The largest hole of a dive, m, and the error of both references if they are compared.
 struct TrueHole {
     hole_m: f64,
     may_be_off_m: Option<f64>,
 }
 
-/// The true holes of the plans, one per seed.
+/// The true holes of each plan, one per seed.
 fn true_holes(
     inputs: &Inputs<'_>,
     planned: &[Planned<'_>],
     middle: [f64; 2],
 ) -> Result<Vec<Vec<TrueHole>>, CostError> {
-    // Without effects that draw random numbers a seed changes only the position off the middle.
+    // Without random effects, a seed changes only the position off the middle.
     let seeds_of = |planned: &Planned<'_>| {
         if planned.way.drift_m > 0.0 { inputs.effort.pick(2, 5) } else { 1 }
     };
@@ -336,7 +336,7 @@ fn true_holes(
     Ok(holes)
 }
 
-/// D_true of a dive, away from its ends.
+/// Largest D_true of a dive, away from the dive's ends.
 fn true_hole(inputs: &Inputs<'_>, dives: &Dives<'_>, seed: u32) -> Result<TrueHole, CostError> {
     let end_m = END_M + dives.target_m;
     let length_m = inputs.effort.length_m() + 2.0 * end_m;
@@ -349,7 +349,7 @@ fn true_hole(inputs: &Inputs<'_>, dives: &Dives<'_>, seed: u32) -> Result<TrueHo
     Ok(TrueHole { hole_m: truth.wall()?.hole_m(from_m, to_m), may_be_off_m })
 }
 
-/// The plan of a vehicle file with another layout and a tolerated drift, as from `headrace plan`.
+/// The plan of a vehicle file with the given layout and tolerated drift, as from `headrace plan`.
 ///
 /// Errors: the vehicle is invalid, or can't be planned for.
 pub fn planner(
@@ -401,7 +401,7 @@ impl Dives<'_> {
     }
 }
 
-/// Advice from the hours of the points.
+/// Advice, derived from the hours of the points.
 fn advice(points: &[Point]) -> String {
     let hours = |method: &str, target_m: f64| {
         let is = |point: &&Point| {

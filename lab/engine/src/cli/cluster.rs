@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Runs as the scheduler or an executor, if requested; returns whether it did.
+    /// Runs as the scheduler or an executor if the options request it; returns whether they did.
     pub(crate) async fn serve(&self, maker: &Arc<Maker>, threads: usize) -> Result<bool, Error> {
         if self.schedule {
             let address = self.listen.unwrap_or(LISTENS[0]);
@@ -52,7 +52,7 @@ impl Arguments {
         Ok(true)
     }
 
-    /// The session of the given scheduler.
+    /// Creates a session on the scheduler named by the options, if any.
     pub(crate) fn session(&self, campaign: &Campaign) -> Result<Option<SessionContext>, Error> {
         let Some(scheduler) = &self.scheduler else { return Ok(None) };
         host_and_port("--scheduler", scheduler)?;

@@ -1,11 +1,12 @@
-//! Campaigns on a cluster of processes on this machine. `lab/try-cluster` kills executors, and measures.
+//! Campaigns on a cluster of processes on this machine. The script `lab/try-cluster` tests killed executors and
+//! measures speed.
 
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, Stdio};
 
 use super::*;
 
-/// Processes that end when this is dropped.
+/// Processes that are killed when this value is dropped.
 struct Cluster {
     address: String,
     processes: Vec<Child>,
@@ -21,7 +22,7 @@ impl Drop for Cluster {
 }
 
 impl Cluster {
-    /// Starts a scheduler and two executors with one thread each and this cache.
+    /// Starts a scheduler and two executors. Each executor has one thread and uses this cache.
     fn start(cache: &Path) -> Self {
         let free = || TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
         let address = free();
@@ -51,7 +52,7 @@ impl Cluster {
 #[test]
 fn executors_give_the_same_tables_and_answers_as_threads() {
     let (folder, scratch) = (dives(), tempfile::tempdir().unwrap());
-    // An unreadable log is a row.
+    // An unreadable log becomes a row.
     std::fs::write(folder.path().join("nothing.mcap"), "nothing").unwrap();
     let (here, there) = (scratch.path().join("here"), scratch.path().join("there"));
     let cluster = Cluster::start(&there);
@@ -86,7 +87,7 @@ fn executors_give_the_same_tables_and_answers_as_threads() {
 }
 
 #[test]
-fn cache_not_shared_with_executors_is_named() {
+fn cache_not_shared_with_executors_is_reported() {
     let (folder, scratch) = (dives(), tempfile::tempdir().unwrap());
     let cluster = Cluster::start(&scratch.path().join("theirs"));
     let output = run(folder.path(), &scratch.path().join("ours"), &["--scheduler", &cluster.address]);
@@ -95,7 +96,7 @@ fn cache_not_shared_with_executors_is_named() {
 }
 
 #[test]
-fn missing_scheduler_is_named() {
+fn missing_scheduler_is_reported() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     for (scheduler, code, why) in
         [("nowhere", 2, "--scheduler nowhere: expected HOST:PORT"), ("127.0.0.1:9", 1, "127.0.0.1:9")]

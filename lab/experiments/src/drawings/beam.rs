@@ -12,7 +12,7 @@ use crate::figures::{Footprint, Footprints};
 const BY_RANGE: Frame = Frame { left: 66.0, top: 100.0, right: 340.0, bottom: 430.0 };
 const BY_ANGLE: Frame = Frame { left: 526.0, top: 100.0, right: 786.0, bottom: 430.0 };
 
-/// Figure 15.
+/// Draws Figure 15.
 pub(super) fn footprints(figure: &Footprints) -> String {
     let all = || figure.by_range.iter().chain(&figure.by_angle).flat_map(|footprint| &footprint.points);
     let most_m = 1.05 * all().map(|[_, m]| *m).fold(0.0, f64::max);

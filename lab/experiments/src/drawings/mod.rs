@@ -9,7 +9,7 @@ mod walls;
 
 use crate::{ExperimentError, Progress, figures};
 
-/// The pictures by file name, as SVG; `progress` gets status messages.
+/// Draws the pictures as SVG, by file name; `progress` receives status messages.
 ///
 /// Errors: none with the built-in vehicles.
 pub fn all(progress: Progress<'_>) -> Result<Vec<(&'static str, String)>, ExperimentError> {

@@ -14,7 +14,7 @@ const SIZE_PX: [u32; 2] = [900, 640];
 const FRAME: Frame = Frame { left: 66.0, top: 78.0, right: 806.0, bottom: 540.0 };
 /// Top of the legend, pixels.
 const LEGEND_PX: f64 = 600.0;
-/// Interval between marked samples in Figures 6 and 8; more marks would overlap.
+/// One sample in this many is marked, in Figure 6 and in Figure 8. More marks would overlap.
 const MARKED: [usize; 2] = [5, 20];
 
 /// Look of dimension lines.
@@ -42,7 +42,7 @@ fn heads(chart: &Chart<'_>, ways: &[Way], samples: &[Place], marked: usize) {
     }
 }
 
-/// Heads from the left, two per row of the legend; returns the position of the next entry.
+/// Draws the heads' entries of the legend from left to right; returns the x position of the next entry, pixels.
 fn legend(canvas: &Canvas, heads: u16) -> f64 {
     let mut x = FRAME.left;
     for head in 0..heads {
@@ -55,13 +55,13 @@ fn legend(canvas: &Canvas, heads: u16) -> f64 {
     x
 }
 
-/// Text of the last line.
+/// Draws the line of text at the bottom.
 fn note(canvas: &Canvas, marked: usize, more: &str) {
     let words = format!("One in {marked} samples is marked. {more}");
     canvas.text([14.0, 626.0], &words, Side::Right, SMALL);
 }
 
-/// A dimension along the tunnel, with its text on white above or below it.
+/// Draws a dimension along the tunnel, with its text on white above or below the dimension line.
 fn measured(chart: &Chart<'_>, [from_m, to_m]: [f64; 2], arc_m: f64, look: &Look, words: (&str, f64)) {
     let (from, to) = (chart.px([from_m, arc_m]), chart.px([to_m, arc_m]));
     chart.canvas.span(from, to, look);
@@ -73,7 +73,7 @@ fn measured(chart: &Chart<'_>, [from_m, to_m]: [f64; 2], arc_m: f64, look: &Look
     chart.canvas.text_on_white([middle, from[1] + below_px], words, Side::Middle, letters);
 }
 
-/// Extension lines of a dimension drawn off its line.
+/// Draws extension lines from a line on the wall to a dimension beside it.
 fn ends(chart: &Chart<'_>, at: [f64; 2], arc_m: f64, to_px: f64) {
     for x_m in at {
         let [x, y]: Px = chart.px([x_m, arc_m]);
@@ -81,7 +81,7 @@ fn ends(chart: &Chart<'_>, at: [f64; 2], arc_m: f64, to_px: f64) {
     }
 }
 
-/// Figure 6.
+/// Draws Figure 6.
 pub(super) fn phase_shift(figure: &PhaseShift) -> String {
     let PhaseShift { heads: count, t_x_m, .. } = figure;
     let spaced_m = t_x_m / f64::from(*count);
@@ -103,7 +103,7 @@ pub(super) fn phase_shift(figure: &PhaseShift) -> String {
     });
     let own: Vec<f64> = figure.at_crown.iter().filter(|(head, _)| *head == 0).map(|(_, x_m)| *x_m).collect();
     if let [from_m, to_m, ..] = own.as_slice() {
-        /// Offset of the T_x dimension below the crown, pixels.
+        /// Distance of the T_x dimension below the crown, pixels.
         const BELOW_PX: f64 = 58.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.crown_m, BELOW_PX);
@@ -127,7 +127,7 @@ pub(super) fn phase_shift(figure: &PhaseShift) -> String {
     canvas.into_svg()
 }
 
-/// Figure 8.
+/// Draws Figure 8.
 pub(super) fn sectors(figure: &Sectors) -> String {
     let title = "Figure 8: two neighbouring heads in sector offset on the unrolled wall".to_owned();
     let subtitle = format!(
@@ -157,7 +157,7 @@ pub(super) fn sectors(figure: &Sectors) -> String {
         measured(&chart, [*from_m, *to_m], figure.line_m, look, (&words, -13.0));
     }
     if let [from_m, _, to_m, ..] = figure.at_line.as_slice() {
-        /// Offset of the sum's dimension below the line, pixels.
+        /// Distance of the sum's dimension below its line on the wall, pixels.
         const BELOW_PX: f64 = 30.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.line_m, BELOW_PX);

@@ -5,8 +5,8 @@ use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::colour::Colour;
 use headrace_pictures::polyline::Px;
 
-/// Evenly spaced, from the pale end. Source: Nuñez, Anderton, Renslow, "Optimizing colormaps with consideration for color
-/// vision deficiency", 2018 (cividis).
+/// Colours at equal intervals, from the pale end. Source: Nuñez, Anderton, Renslow, "Optimizing colormaps with
+/// consideration for color vision deficiency", 2018 (cividis).
 const STOPS: [[u8; 3]; 9] = [
     [254, 232, 56],
     [228, 206, 83],
@@ -35,13 +35,13 @@ pub(super) fn colour(level: usize) -> Colour {
     Colour(part(|[red, _, _]| red), part(|[_, green, _]| green), part(|[_, _, blue]| blue))
 }
 
-/// The level of a value on a scale from zero to `most`; clamped above.
+/// The level of a value on a scale from zero to `most`. Larger values have the highest level.
 pub(super) fn level(value: f64, most: f64) -> usize {
     let level = math::floor_to_i64(value / most * LEVELS as f64).max(0);
     usize::try_from(level).unwrap_or(0).min(LEVELS - 1)
 }
 
-/// A strip of all colours with numbers from zero to `most` below it and text above.
+/// Draws a strip of all colours, with numbers from zero to `most` below the strip and text above.
 pub(super) fn legend(canvas: &Canvas, [left, top]: Px, [width, height]: Px, words: &str, most: f64) {
     canvas.text([left, top - 11.0], words, Side::Right, NORMAL);
     let step_px = width / LEVELS as f64;

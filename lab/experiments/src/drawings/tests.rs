@@ -1,4 +1,4 @@
-//! Tests that the pictures are well-formed and reproducible, and checks their content.
+//! Tests that the pictures are well-formed, reproducible and have the expected content.
 
 use headrace_pictures::xml::well_formed;
 
@@ -21,7 +21,8 @@ fn figure_6_shows_evenly_spaced_passes_and_a_faster_head() {
     assert!((figure.t_x_m - 0.197 * 4.8).abs() < 1e-9);
     assert_eq!(figure.at_crown.len(), 8);
     for pair in figure.at_crown.windows(2) {
-        // A step of 2.4 degrees late or early is 0.006 m; adjacent heads see the crown at different angles.
+        // Pings a step of 2.4 degrees late or early shift a pass by 0.006 m; adjacent heads see the crown at different
+        // angles.
         assert!((pair[1].1 - pair[0].1 - spaced_m).abs() < 0.1 * spaced_m, "{:?}", figure.at_crown);
     }
     assert_eq!(figure.faster.len(), 8, "a way for each turn");

@@ -17,17 +17,17 @@ const LEFT_PX: f64 = 66.0;
 const RIGHT_PX: f64 = 802.0;
 /// Gap between panels, pixels.
 const APART_PX: f64 = 20.0;
-/// Height of the panels of samples and of surfaces, pixels.
+/// Top and bottom of the panels of samples, and of the panels of surfaces, pixels.
 const SAMPLES_PX: [f64; 2] = [136.0, 446.0];
 const SURFACES_PX: [f64; 2] = [514.0, 790.0];
 /// Maximum number of dots in a panel.
 const MOST_DOTS: usize = 3000;
-/// Strips with widely spaced passes or none.
+/// Colours of strips with widely spaced passes, and of strips without passes.
 const WIDE: Colour = Colour(255, 244, 200);
 const UNSEEN: Colour = Colour(245, 170, 90);
 const GAP: Look = Look { colour: Colour(213, 94, 0), width_px: 1.8, dash: &[], marker: Marker::Circle };
 
-/// Panels side by side: samples above, surfaces below.
+/// Draws panels side by side, samples above and surfaces below.
 pub(super) fn walls(title: &str, figure: &Walls) -> String {
     let subtitle = format!(
         "VITA 2, {} m/s, simulated with 10 mm of noise: {:.0} m of a dive of {:.0} m. s: number of heads.",
@@ -76,7 +76,7 @@ fn titles(canvas: &Canvas, panel: &Panel, left: f64) {
     }
 }
 
-/// Text on the largest T_x.
+/// Text that states the largest T_x.
 fn gap_words(panel: &Panel) -> String {
     let Some(gap) = panel.widest else { return "no two passes".to_owned() };
     let length_m = gap.length_m();
@@ -106,12 +106,12 @@ fn samples(chart: &Chart<'_>, panel: &Panel, length_m: f64) {
     }
 }
 
-/// Interval between drawn samples.
+/// One sample in this many is drawn.
 fn thinned(panel: &Panel) -> usize {
     panel.samples.len().div_ceil(MOST_DOTS).max(1)
 }
 
-/// Draws cells by colour; vertically adjacent cells of one colour are joined.
+/// Draws cells by colour. Vertically adjacent cells of one colour are joined.
 fn surface(chart: &Chart<'_>, panel: &Panel, figure: &Walls) {
     let [along, round] = panel.cells.map(|cells| usize::try_from(cells).unwrap_or(1).max(1));
     let size_m = [figure.length_m / along as f64, figure.profile.perimeter_m() / round as f64];
@@ -122,7 +122,7 @@ fn surface(chart: &Chart<'_>, panel: &Panel, figure: &Walls) {
         let mut from = 0;
         for run in levels.chunk_by(|a, b| a == b) {
             let to = from + run.len();
-            // On whole pixels, so that no gap shows between neighbours.
+            // Edges are on whole pixels, so that no gap shows between neighbours.
             let corner = |i: usize, k: usize| {
                 chart.px([i as f64 * size_m[0], k as f64 * size_m[1]]).map(|px| math::round_to_i64(px) as f64)
             };

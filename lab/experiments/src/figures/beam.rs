@@ -7,40 +7,40 @@ use headrace_simulator::effects::Cone;
 
 use crate::ExperimentError;
 
-/// Widths of the 881L's beam: at 1 MHz and at 600 kHz, degrees (the paper's §6).
+/// Widths of the 881L's beam at 1 MHz and at 600 kHz, degrees (the paper's §6).
 const BEAMS_DEG: [f64; 2] = [1.4, 2.4];
 /// Largest range setting of the paper's experiments, m.
 const RANGE_M: f64 = 10.0;
-/// Points of a curve.
+/// Number of points of a curve.
 const POINTS: u32 = 60;
-/// Rays of a simulated beam: the most a scene allows.
+/// Number of rays of a simulated beam: the largest number that a scene allows.
 const RAYS: usize = 64;
-/// Interval between points of a curve that are also simulated.
+/// One point in this many is also simulated.
 const SIMULATED: u32 = 6;
 
-/// Figure 15.
+/// Data of Figure 15.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Footprints {
-    /// Perpendicular to a wall, by the range to it, m.
+    /// Footprints of a beam perpendicular to a wall, by the range to the wall, m.
     pub by_range: Vec<Footprint>,
-    /// On the floor, by the angle from straight down, degrees.
+    /// Footprints on the floor, by the beam's angle from straight down, degrees.
     pub by_angle: Vec<Footprint>,
-    /// Height of the head above that floor, m.
+    /// Height of the head above the floor, m.
     pub height_m: f64,
-    /// Direction of that floor's corner, degrees from straight down.
+    /// Direction of the floor's corner, degrees from straight down.
     pub corner_deg: f64,
     /// The largest range, m.
     pub range_m: f64,
 }
 
-/// A beam's footprints.
+/// The footprints of one beam.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Footprint {
     /// The beam's full width, degrees.
     pub beam_deg: f64,
-    /// Range or angle, and the footprint by the formula, m.
+    /// Range or angle, and the length of the footprint by the formula, m.
     pub points: Vec<[f64; 2]>,
-    /// Range or angle, and the extent of the simulated rays' hits on the wall, m.
+    /// Range or angle, and the extent of the hits of simulated rays on the wall, m.
     pub simulated: Vec<[f64; 2]>,
 }
 
@@ -95,7 +95,7 @@ fn met_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> f64 {
     let (sine, cosine) = math::sin_cos(angle_rad);
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for [middle, _, across] in Cone::new(beam_rad, RAYS).parts() {
-        // Down and sideways: the beam's axis rotated by the angle.
+        // The beam's axis is rotated from straight down towards the side by the angle.
         let (down, aside) = (middle * cosine - across * sine, middle * sine + across * cosine);
         let at = distance_m * aside / down;
         (least, most) = (least.min(at), most.max(at));

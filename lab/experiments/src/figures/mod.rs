@@ -23,12 +23,12 @@ pub(crate) struct Place {
     pub arc_m: f64,
 }
 
-/// A piece of a head's track over the unrolled wall that doesn't cross its seam.
+/// A piece of a head's track over the unrolled wall. A piece does not cross the seam.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Way {
     /// Head number.
     pub head: u16,
-    /// Distance along the tunnel from the picture's start, and arc length, m.
+    /// Distance along the tunnel from the picture's start, and arc length, of each point, m.
     pub points: Vec<[f64; 2]>,
 }
 
@@ -44,13 +44,13 @@ impl Window {
         (0.0..=self.length_m).contains(&(x_m - self.from_m))
     }
 
-    /// The wall's samples within, in time order per head.
+    /// The samples of the wall within the window, in time order for each head.
     fn places(&self, dive: &Dive) -> Vec<Place> {
         let within = dive.heads.iter().flatten().filter(|s| s.of_wall && self.has(s.at.x()));
         within.map(|s| Place { head: s.head, x_m: s.at.x() - self.from_m, arc_m: s.arc_m }).collect()
     }
 
-    /// The heads' tracks within the window and one step beyond.
+    /// The heads' tracks within the window, and one step beyond it.
     fn ways(&self, dive: &Dive) -> Vec<Way> {
         let mut ways = Vec::new();
         for samples in &dive.heads {
@@ -68,11 +68,13 @@ impl Window {
     }
 }
 
-/// Adds a step to the track that it continues, if any. A step over the seam becomes two that meet there.
+/// Appends a step to the last track if the step continues it; otherwise begins a new track.
+///
+/// A step over the seam is split into two that end at the seam.
 fn add_step(ways: &mut Vec<Way>, head: u16, perimeter_m: f64, from: [f64; 2], to: [f64; 2]) {
     for [begin, end] in polyline::over_seam(perimeter_m, from, to) {
         match ways.last_mut() {
-            // A step that ends on the seam has no part beyond it.
+            // The second part of a step that ends on the seam has no length.
             _ if (begin[0] - end[0]).abs() + (begin[1] - end[1]).abs() <= 0.0 => (),
             Some(way) if way.head == head && way.points.last() == Some(&begin) => way.points.push(end),
             _ => ways.push(Way { head, points: vec![begin, end] }),

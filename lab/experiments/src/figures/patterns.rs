@@ -9,11 +9,11 @@ use crate::ExperimentError;
 use crate::runs::{Dive, SPEED_MPS, Setting};
 use crate::spacing::passes_of;
 
-/// Run-up before the picture, so that every head has passed its start, m.
+/// Length of dive before the picture, m. It is long enough for every head to pass the picture's start.
 const BEFORE_M: f64 = 4.0;
 /// Start of the dives, m.
 const START_M: f64 = 5.0;
-/// Position in a sector at which the two distances are shown, as a share of it.
+/// Position within the sector at which the two distances are shown, as a share of the sector.
 const SHARE: f64 = 0.8;
 /// Angle between the drawn points of the faster head, degrees.
 const FASTER_STEP_DEG: u32 = 2;
@@ -25,7 +25,7 @@ pub(crate) struct PhaseShift {
     pub profile: Profile,
     /// Number of heads.
     pub heads: u16,
-    /// Their mode.
+    /// Mode of the heads.
     pub mode: &'static str,
     /// Speed, m/s.
     pub speed_mps: f64,
@@ -33,24 +33,24 @@ pub(crate) struct PhaseShift {
     pub t_x_m: f64,
     /// The picture's length, m.
     pub length_m: f64,
-    /// Their samples.
+    /// Samples of the heads.
     pub samples: Vec<Place>,
-    /// Their tracks.
+    /// Tracks of the heads.
     pub ways: Vec<Way>,
-    /// Track of one head that turns faster by a factor of the number of heads.
+    /// Track of a single head that turns faster, by a factor equal to the number of heads.
     pub faster: Vec<Way>,
     /// Arc length of the crown, m.
     pub crown_m: f64,
-    /// Heads and the positions at which they pass the crown, ascending, m.
+    /// Head number and position, m, of each pass over the crown, in ascending order of position.
     pub at_crown: Vec<(u16, f64)>,
 }
 
-/// Figure 8: two heads in sector offset over three sweeps there and back.
+/// Figure 8: two heads in sector offset over three sweeps, each there and back.
 #[derive(Debug, Clone)]
 pub(crate) struct Sectors {
     /// The tunnel's profile.
     pub profile: Profile,
-    /// The mode of the heads.
+    /// Mode of the heads.
     pub mode: &'static str,
     /// Speed, m/s.
     pub speed_mps: f64,
@@ -58,19 +58,19 @@ pub(crate) struct Sectors {
     pub t_x_m: f64,
     /// The picture's length, m.
     pub length_m: f64,
-    /// Their samples.
+    /// Samples of the heads.
     pub samples: Vec<Place>,
-    /// Their tracks.
+    /// Tracks of the heads.
     pub ways: Vec<Way>,
-    /// A line nearer to an end of head 0's sector, m.
+    /// Arc length of a line near one end of head 0's sector, m.
     pub line_m: f64,
-    /// Positions at which head 0 passes it, m.
+    /// Positions at which head 0 passes the line, m.
     pub at_line: Vec<f64>,
-    /// The two distances there by the paper's formula, the shorter first, m.
+    /// The two distances between passes on the line by the paper's formula, the shorter one first, m.
     pub alternating_m: [f64; 2],
-    /// The middle of head 0's sector, m.
+    /// Arc length of the middle of head 0's sector, m.
     pub middle_m: f64,
-    /// Positions at which head 0 passes it, m.
+    /// Positions at which head 0 passes the middle of its sector, m.
     pub at_middle: Vec<f64>,
 }
 
@@ -135,7 +135,7 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
         let turned_rad = f64::from(number * FASTER_STEP_DEG).to_radians();
         let (sine, cosine) = math::sin_cos(if growing { turned_rad } else { -turned_rad });
         let arc_m = match number * FASTER_STEP_DEG % 360 {
-            // The seam itself may be rounded to either side.
+            // The exact value avoids rounding at the seam to either side.
             0 => 0.0,
             _ => dive.profile.arc_of([y_m + sine, z_m - cosine]),
         };
@@ -162,7 +162,7 @@ pub(crate) fn sectors() -> Result<Sectors, ExperimentError> {
     let t_x_m = pitch_m(&dive) / f64::from(HEADS);
     let first = dive.heads.first().map(Vec::as_slice).unwrap_or_default();
     let [y_m, z_m] = dive.profile.reference();
-    // Head 0 sweeps half a turn from the floor's centre, to the side with most of its samples.
+    // Head 0 sweeps half a turn from the floor's centre, towards the side with most of its samples.
     let half_m = dive.profile.perimeter_m() / 2.0;
     let left = first.iter().filter(|sample| sample.arc_m < half_m).count() * 2 > first.len();
     let at_share = |share: f64| {

@@ -1,4 +1,4 @@
-//! Tests the seam and the beams. Figures of whole dives are tested with their drawings.
+//! Tests tracks at the seam, and beams. The figures of whole dives are tested with their drawings.
 
 use super::*;
 
@@ -26,6 +26,6 @@ fn simulated_beams_match_the_formula() {
         }
         assert!(footprint.points.windows(2).all(|pair| pair[0][1] < pair[1][1]));
     }
-    // "up to around 25 cm" at 10 m.
+    // The paper states "up to around 25 cm" at 10 m.
     assert!((figure.by_range[0].points.last().unwrap()[1] - 0.2444).abs() < 1e-4);
 }

@@ -15,18 +15,18 @@ use crate::{ExperimentError, Progress};
 const SHOWN_M: f64 = 12.0;
 /// Start of the dives, m.
 const START_M: f64 = 5.0;
-/// Cells along the stretch and around the wall.
+/// Number of cells along the stretch, and around the wall.
 const CELLS: [u32; 2] = [40, 100];
-/// Lines along the wall on which passes are counted.
+/// Number of lines along the wall on which passes are counted.
 const LINES: u32 = 360;
-/// Ratio of a line's largest gap to the usual one from which the line is in a shadow.
+/// Ratio of a line's largest gap to the usual gap above which the line counts as in a shadow.
 const IN_SHADOW: f64 = 1.5;
 /// Share of cells within the distance scale.
 ///
-/// The cells at a floor's corners exceed it, since any such surface rounds corners off.
+/// The cells at a floor's corners exceed the scale, since a Poisson surface rounds corners off.
 const SCALE_SHARE: f64 = 0.93;
 
-/// Heads, mode, sectors, aligned.
+/// Number of heads, mode, whether in sectors, whether aligned.
 type Configuration = (u8, &'static str, bool, bool);
 
 /// Figure 12: two heads with and without their phases aligned.
@@ -40,7 +40,7 @@ pub(crate) const AT_GAPS: [Configuration; 4] = [
     (4, "medium", true, true),
 ];
 
-/// Panels side by side, all of one stretch.
+/// Panels side by side, which all show the same stretch.
 #[derive(Debug, Clone)]
 pub(crate) struct Walls {
     /// The tunnel's profile.
@@ -53,56 +53,56 @@ pub(crate) struct Walls {
     pub length_m: f64,
     /// The panels.
     pub panels: Vec<Panel>,
-    /// Upper end of the colour scale, m; all except a few cells are below.
+    /// Upper end of the colour scale, m. Only a few cells have larger distances.
     pub most_m: f64,
 }
 
-/// A configuration's stretch of wall.
+/// The stretch of wall as sampled by one configuration.
 #[derive(Debug, Clone)]
 pub(crate) struct Panel {
     /// Number of heads.
     pub heads: u8,
-    /// Their mode.
+    /// Mode of the heads.
     pub mode: &'static str,
-    /// Sector offset instead of phase shift.
+    /// Whether the heads are in sector offset instead of phase shift.
     pub sectors: bool,
-    /// Phases aligned.
+    /// Whether the phases are aligned.
     pub aligned: bool,
     /// T_x of a single head, divided by the number of heads, m.
     pub t_x_m: f64,
-    /// The samples, in time order per head.
+    /// Samples of the stretch, in time order for each head.
     pub samples: Vec<Place>,
-    /// Cells along the stretch and around the wall.
+    /// Number of cells along the stretch, and around the wall.
     pub cells: [u32; 2],
-    /// Unsigned distance of each cell's centre from the surface, m; index along the stretch outermost.
+    /// Unsigned distance of each cell's centre from the surface, m. The cells around the wall are consecutive.
     pub distances_m: Vec<f64>,
-    /// Their mean, m.
+    /// Mean of the distances, m.
     pub mean_m: f64,
-    /// The largest distance along the tunnel between passes, on lines with passes.
+    /// The longest gap between passes along the tunnel, among lines with at least two passes.
     pub widest: Option<Gap>,
-    /// Strips of wall with passes more than 1.5 T_x / s apart somewhere, from and to, m.
+    /// Start and end of strips of wall in which some gap between passes exceeds 1.5 T_x / s, m.
     pub wide_m: Vec<[f64; 2]>,
-    /// Strips of wall without passes, from and to, m.
+    /// Start and end of strips of wall without passes, m.
     pub unseen_m: Vec<[f64; 2]>,
 }
 
-/// Wall between two passes.
+/// A gap between two passes on a line along the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gap {
-    /// The line's arc length, m.
+    /// Arc length of the line, m.
     pub arc_m: f64,
-    /// Its begin and end, from the picture's start, m.
+    /// Start and end of the gap, from the picture's start, m.
     pub x_m: [f64; 2],
 }
 
 impl Gap {
-    /// Its length, m.
+    /// Length of the gap, m.
     pub(crate) fn length_m(&self) -> f64 {
         self.x_m[1] - self.x_m[0]
     }
 }
 
-/// Simulates dives as for the meshes and evaluates a stretch in their middle.
+/// Simulates dives as for the meshes, and evaluates a stretch in the middle of each dive.
 ///
 /// Errors: no surface can be made; none with the built-in vehicles.
 pub(crate) fn walls(
@@ -121,7 +121,7 @@ pub(crate) fn walls(
     let last = math::floor_to_i64(SCALE_SHARE * all.len() as f64);
     let most_m = all.get(crate::index(last)).copied().unwrap_or_default();
     let profile = headrace_geometry::tunnel::shapes::ceran_blueprint()?;
-    // Rounded up to whole centimetres.
+    // The scale ends at a whole centimetre.
     let most_m = (most_m * 100.0).ceil().max(1.0) / 100.0;
     Ok(Walls { profile, speed_mps: SPEED_MPS, dive_m: LENGTH_M, length_m: SHOWN_M, panels, most_m })
 }
@@ -169,7 +169,7 @@ fn distances(dive: &Dive, window: Window) -> Result<Vec<f64>, ExperimentError> {
     Ok(cells.map(distance_m).collect())
 }
 
-/// A line along the wall with its passes within the stretch.
+/// A line along the wall, with the passes over it within the stretch.
 struct Line {
     arc_m: f64,
     passes_m: Vec<f64>,
@@ -198,7 +198,7 @@ fn lines(dive: &Dive, window: Window) -> Vec<Line> {
     (0..LINES).map(line).collect()
 }
 
-/// The largest gap. Among adjacent lines in the same shadow, that of the middle one.
+/// The largest gap. If adjacent lines are in the same shadow, the gap is that of the shadow's middle line.
 fn widest(lines: &[Line]) -> Option<Gap> {
     let mut lengths: Vec<f64> = lines.iter().filter_map(Line::widest).map(|gap| gap.length_m()).collect();
     lengths.sort_by(f64::total_cmp);
@@ -208,12 +208,12 @@ fn widest(lines: &[Line]) -> Option<Gap> {
     let (number, worst) = lines.iter().enumerate().max_by(|a, b| length_m(a.1).total_cmp(&length_m(b.1)))?;
     let before = lines.iter().take(number).rev().take_while(shadowed).count();
     let after = lines.iter().skip(number + 1).take_while(shadowed).count();
-    // The middle of the shadow.
+    // Index of the line in the middle of the shadow.
     let middle = (2 * number + after).saturating_sub(before) / 2;
     lines.get(middle).unwrap_or(worst).widest()
 }
 
-/// Runs of lines that satisfy `kind`, from and to, m.
+/// Start and end of the strips made of adjacent lines that satisfy `kind`, m.
 fn strips(lines: &[Line], perimeter_m: f64, kind: impl Fn(&Line) -> bool) -> Vec<[f64; 2]> {
     let apart_m = perimeter_m / f64::from(LINES);
     let mut strips: Vec<[f64; 2]> = Vec::new();

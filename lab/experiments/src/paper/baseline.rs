@@ -24,7 +24,7 @@ impl Baselines {
         Ok(Self { modes, rigs })
     }
 
-    /// The mode with that name.
+    /// Finds a mode by its name.
     pub(super) fn mode(&self, name: &'static str) -> Result<Mode, PaperError> {
         self.modes.iter().find(|mode| mode.name == name).copied().ok_or(PaperError::Mode { name })
     }

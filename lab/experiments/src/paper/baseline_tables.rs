@@ -43,7 +43,8 @@ pub struct SeveralHeadsRow {
     pub t_y_max_m: Cell,
 }
 
-/// A printed number beside recomputed ones at the paper's stated speed and at the speed of its computation.
+/// A printed number beside recomputed numbers at two speeds: the speed that the paper states, and the speed that gives
+/// its digits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AtBothSpeeds {
     /// At [`STATED_SPEED_MPS`].

@@ -7,15 +7,15 @@ use super::printed::{Digits, Printed, difference_percent};
 /// A printed number and the recomputed one, both in the unit of the field's name.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cell {
-    /// As the paper has it.
+    /// The number as printed.
     pub printed: Printed,
     /// Recomputed value.
     pub ours: f64,
     /// Difference of the recomputed from the printed number, percent of the printed one; `None` for a printed zero.
     pub difference_percent: Option<f64>,
-    /// Whether rounding or truncating the recomputed value gives the printed digits.
+    /// Whether the printed digits follow from the recomputed value by rounding or by truncating.
     pub digits: Digits,
-    /// Mark of the note that it refers to.
+    /// Mark of the note that explains the cell.
     pub note: Option<char>,
 }
 
@@ -45,13 +45,13 @@ pub enum NoteKind {
 /// A table of the paper.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Table<Row> {
-    /// Its number in the paper.
+    /// Number of the table in the paper.
     pub number: u8,
     /// Title.
     pub title: &'static str,
-    /// Its rows, in the paper's order.
+    /// Rows of the table, in the paper's order.
     pub rows: Vec<Row>,
-    /// Its notes.
+    /// Notes on the table.
     pub notes: Vec<Note>,
 }
 
@@ -65,14 +65,14 @@ impl Cell {
         Self { note: Some(mark), ..self }
     }
 
-    /// Adds the mark of a note, unless rounding or truncating the value gives the printed digits.
+    /// Adds the mark of a note, unless rounding or truncating the recomputed value gives the printed digits.
     pub(super) fn noted_unless_equal(self, mark: char) -> Self {
         if self.digits == Digits::Neither { self.noted(mark) } else { self }
     }
 
-    /// Adds the mark of a note, unless rounding the value gives the printed digits.
+    /// Adds the mark of a note, unless rounding the recomputed value gives the printed digits.
     ///
-    /// If related numbers differ, truncation would match this one only by chance.
+    /// Truncation doesn't count here. If related numbers differ, truncation would match this number only by chance.
     pub(super) fn noted_unless_rounded(self, mark: char) -> Self {
         if self.digits.rounded() { self } else { self.noted(mark) }
     }

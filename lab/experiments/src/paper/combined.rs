@@ -16,9 +16,9 @@ pub struct CombinedRow {
     pub mode: &'static str,
     /// s, the number of heads.
     pub heads: u8,
-    /// In phase shift.
+    /// T in phase shift.
     pub phase_shift: Combined,
-    /// In sector offset.
+    /// T in sector offset.
     pub sector_offset: Combined,
 }
 
@@ -33,27 +33,28 @@ pub struct Combined {
     pub t_max_m: CombinedCell,
 }
 
-/// A printed T beside two recomputed ones. Like the paper, they ignore the vehicle's advance between two pings.
+/// A printed T beside two recomputed ones. Like the paper, the recomputed values ignore the vehicle's advance between
+/// two pings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CombinedCell {
-    /// From the T_x and T_y that Table 4 prints as experimental.
+    /// Recomputed from the T_x and T_y that Table 4 prints as experimental.
     pub from_experiment: Cell,
-    /// From the recomputed baseline at [`STATED_SPEED_MPS`].
+    /// Recomputed from the baseline at [`STATED_SPEED_MPS`].
     pub predicted: Cell,
 }
 
 impl Combined {
-    /// Mean, least and largest.
+    /// The cells for the mean, least and largest T_y.
     pub fn cells(&self) -> [CombinedCell; 3] {
         [self.t_mean_m, self.t_min_m, self.t_max_m]
     }
 }
 
-/// The columns of a layout in Tables 4 and 5.
+/// Names of the columns of a layout in Tables 4 and 5.
 struct Columns {
     layout: HeadLayout,
     t_x: &'static str,
-    /// T_y in Table 4 and T in Table 5: mean, least, largest.
+    /// Columns of T_y in Table 4 and of T in Table 5, for mean, least and largest.
     t_y_and_t: [[&'static str; 2]; 3],
 }
 
@@ -77,7 +78,7 @@ const SECTOR_OFFSET: Columns = Columns {
     ],
 };
 
-/// Table 5, whose lines are in the order of Table 4's.
+/// Recomputes Table 5, whose rows are in the same order as Table 4's.
 pub(super) fn combined(baselines: &Baselines) -> Result<Table<CombinedRow>, PaperError> {
     let row = |(line, experiment): (Line, Line)| {
         Ok(CombinedRow {

@@ -1,4 +1,4 @@
-//! The baseline across the tunnel: T_y of a stationary head at the worst drift and mounting offset.
+//! The baseline across the tunnel: T_y of a stationary head at the largest drift and mounting offset.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::PI;
@@ -15,7 +15,8 @@ const DRIFT_M: f64 = 1.5;
 const YAW_DEG: f64 = 15.0;
 /// Soundings per turn, a hundredth of a degree apart.
 ///
-/// Every step of Table 2 is a whole number of them, and the last step before a corner is found to 0.2 % of its length.
+/// Every step of Table 2 is a whole number of these soundings. The last step before a corner is found to 0.2 % of its
+/// length.
 const SOUNDINGS: u32 = 36_000;
 
 /// Mounting positions of the heads on the vehicle (§8).
@@ -46,7 +47,7 @@ impl Rig {
         }
     }
 
-    /// Offsets of its heads from the vehicle's centre, left and up, m.
+    /// Offsets of the rig's heads from the vehicle's centre, left and up, m.
     fn offsets_m(self) -> &'static [[f64; 2]] {
         match self {
             Self::Vita1 => &[[0.0, -0.15]],
@@ -83,10 +84,10 @@ pub(super) fn height_m(profile: &Profile) -> Result<f64, PaperError> {
     Ok(z_m + standing(profile, y_m, z_m, 0.0)?.sounding(PI)?.range_m())
 }
 
-/// The largest chord between neighbouring samples in each mode, for any phase of the pings within the turn.
+/// The largest chord between neighbouring samples in each mode, for any phase of the pings within the turn, m.
 ///
-/// It is the worst case over the positions and headings that the paper allows. Drift and mounting offset add up,
-/// whatever the heading.
+/// The value is the worst case over the positions and headings that the paper allows. Drift and mounting offset are
+/// added, whatever the heading.
 fn largest_chords_m(profile: &Profile, rig: Rig, modes: &[Mode]) -> Result<Vec<f64>, PaperError> {
     let middle_m = height_m(profile)? / 2.0;
     let mut largest_m = vec![0.0; modes.len()];
@@ -104,7 +105,7 @@ fn largest_chords_m(profile: &Profile, rig: Rig, modes: &[Mode]) -> Result<Vec<f
     Ok(largest_m)
 }
 
-/// All combinations of zero or maximal drift left, up and in heading.
+/// All combinations of the drifts -1, 0 and 1 times the maximum: left, up and in heading.
 fn extremes() -> impl Iterator<Item = [f64; 3]> {
     const ENDS: [f64; 3] = [-1.0, 0.0, 1.0];
     ENDS.into_iter().flat_map(|y| ENDS.into_iter().flat_map(move |z| ENDS.map(|yaw| [y, z, yaw])))

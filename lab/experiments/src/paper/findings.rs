@@ -20,7 +20,7 @@ pub(super) struct Place {
 
 /// The position from which Eq. 5 and 6 give a rig's printed T_ymin and T_ymax.
 ///
-/// It was found by search; the tests check every printed digit that isn't an erratum.
+/// The positions were found by search. The tests check every printed digit that isn't an erratum.
 pub(super) fn fitting_place(rig: Rig) -> Place {
     match rig {
         Rig::Vita1 => Place { floor_m: 2.511, aside_m: 6.613 },
@@ -29,12 +29,12 @@ pub(super) fn fitting_place(rig: Rig) -> Place {
     }
 }
 
-/// Whether the baseline across the tunnel in this row of Table 4 is a copy of FASTER's.
+/// Whether the T_y columns of this row of Table 4 are a copy of FASTER's.
 pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }
 
-/// Intervals of an input that give the printed T_y of the rows without errata.
+/// Values of an input that give the printed T_y of all rows without errata.
 fn of_rows(
     rows: impl IntoIterator<Item = Line>,
     wanted: impl Fn(&str, u8) -> bool,
@@ -49,9 +49,9 @@ fn of_rows(
     Ok(Interval::common(intervals))
 }
 
-/// Perimeters that give all printed means of Tables 3 and 4 when divided by n, m.
+/// Perimeters that give all printed means of Tables 3 and 4, m. A mean is the perimeter divided by n.
 ///
-/// One interval assumes rounding, the other allows truncation too.
+/// The first interval assumes rounding; the second one also allows truncation.
 pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
     let perimeter = |from: fn(&super::Printed) -> Interval| {
         of_rows(
@@ -66,7 +66,8 @@ pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], Paper
     Ok([perimeter(super::Printed::rounded_from)?, perimeter(super::Printed::read_from)?])
 }
 
-/// Speeds that give all printed T_x of Table 3 (except FAST's), and all T_x / s and 2 T_x / s of Table 4, m/s.
+/// Speeds that give all printed T_x of Table 3 except FAST's, and speeds that give all T_x / s and 2 T_x / s of Table
+/// 4, m/s.
 pub(super) fn speeds_mps(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
     let speed = |line: &Line, column, passes: f64| {
         let period_s = baselines.of(line)?.0.turn.period_s();
@@ -85,7 +86,7 @@ pub(super) fn speeds_mps(baselines: &Baselines) -> Result<[Interval; 2], PaperEr
     Ok([one_head, several])
 }
 
-/// Distances to the floor from which Eq. 5 gives a rig's printed minima, m, for the selected modes.
+/// Distances from the floor with which Eq. 5 gives a rig's printed minima in the selected modes, m.
 pub(super) fn floors_m(
     baselines: &Baselines,
     rig: Rig,
@@ -101,7 +102,7 @@ pub(super) fn floors_m(
     )
 }
 
-/// The step along a flat floor that ends in the corner, m: Eq. 6 with m theta at the corner.
+/// The step along a flat floor that ends in the corner, m (Eq. 6 with m theta at the corner).
 pub(super) fn corner_step_m(place: Place, step_rad: f64) -> f64 {
     let corner = math::atan2(place.aside_m, place.floor_m);
     place.floor_m * (math::tan(corner) - math::tan(corner - step_rad))

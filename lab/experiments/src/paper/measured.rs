@@ -3,16 +3,16 @@
 use super::PaperError;
 use super::printed::{Line, Printed, lines};
 
-/// The paper's measurements in a simulated run.
+/// The paper's measurements of a simulated run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// The mode's name, in capitals.
     pub mode: &'static str,
     /// Number of heads.
     pub heads: u8,
-    /// In phase shift, or one continuously turning head.
+    /// Spacings in phase shift, or of one continuously turning head.
     pub phase_shift: Spacings,
-    /// In sector offset; `None` for one head.
+    /// Spacings in sector offset; `None` for one head.
     pub sector_offset: Option<Spacings>,
 }
 

@@ -31,7 +31,7 @@ pub const SOURCE: &str = "Jorge et al., Sensors 2021, 21, 1900 (CC BY 4.0)";
 pub const STATED_SPEED_MPS: f64 = 0.197;
 /// The speed for which Table 4's baseline was computed, m/s.
 ///
-/// To a tenth of a millimetre per second it is the only speed that gives the printed digits.
+/// This is the only multiple of 0.1 mm/s that gives the printed digits.
 pub const FITTING_SPEED_MPS: f64 = 0.196;
 
 /// Tables 1 to 5.
@@ -47,21 +47,21 @@ pub struct Tables {
     pub consistent_speed_mps: Interval,
     /// The perimeter used for the recomputed means, m.
     pub perimeter_m: f64,
-    /// Perimeters that give all printed means of Tables 3 and 4 with rounding, m; except copied rows.
+    /// Perimeters that, with rounding, give all printed means of Tables 3 and 4 except those of copied rows, m.
     pub consistent_perimeter_m: Interval,
-    /// Overlap of beams.
+    /// Table 1: overlap of beams.
     pub table_1: Table<OverlapRow>,
-    /// Modes.
+    /// Table 2: modes.
     pub table_2: Table<ModeRow>,
-    /// One head.
+    /// Table 3: one head.
     pub table_3: Table<OneHeadRow>,
-    /// Several heads.
+    /// Table 4: several heads.
     pub table_4: Table<SeveralHeadsRow>,
-    /// T.
+    /// Table 5: T.
     pub table_5: Table<CombinedRow>,
 }
 
-/// The tables can't be computed because of an error in the built-in numbers.
+/// A reason why the tables can't be computed: an error in the built-in numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PaperError {
@@ -70,7 +70,7 @@ pub enum PaperError {
     Printed {
         /// Number of the table.
         table: u8,
-        /// Line of its file, from 1.
+        /// Line of the table's file, from 1.
         line: usize,
         /// Name of the column.
         column: &'static str,
@@ -78,7 +78,7 @@ pub enum PaperError {
     /// A mode that isn't in Table 2.
     #[error("mode {name} isn't in table 2")]
     Mode {
-        /// Its name.
+        /// Name of the mode.
         name: &'static str,
     },
     /// A number outside the sampling formulas' domain.
@@ -89,7 +89,7 @@ pub enum PaperError {
     Profile(#[from] ProfileError),
 }
 
-/// All five tables.
+/// Recomputes all five tables.
 ///
 /// Errors: none with the built-in numbers.
 pub fn tables() -> Result<Tables, PaperError> {

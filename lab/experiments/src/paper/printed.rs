@@ -7,7 +7,8 @@ use serde::{Serialize, Serializer};
 
 use super::PaperError;
 
-/// Tolerance of recomputed values, as a share of a printed number's last digit: 0.196 x 8 / 2 is just off 0.784.
+/// Tolerance of recomputed values, as a share of a printed number's last digit. In floating point, 0.196 x 8 / 2 is
+/// slightly off 0.784.
 const ROUNDING: f64 = 1e-6;
 /// More decimals than any table has.
 const MOST_DECIMALS: usize = 6;
@@ -23,13 +24,13 @@ pub struct Printed {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Digits {
-    /// By rounding, and by truncating as well.
+    /// Both rounding and truncating give the digits.
     Both,
-    /// By rounding.
+    /// Only rounding gives the digits.
     Rounded,
-    /// By truncating.
+    /// Only truncating gives the digits.
     Truncated,
-    /// By neither.
+    /// Neither rounding nor truncating gives the digits.
     Neither,
 }
 
@@ -61,7 +62,7 @@ impl Printed {
         self.value
     }
 
-    /// How its digits follow from `ours`.
+    /// How the digits follow from the recomputed value `ours`.
     pub fn digits_of(&self, ours: f64) -> Digits {
         let beyond = (ours - self.value) / self.last_digit();
         let rounded = beyond.abs() <= 0.5 + ROUNDING;
@@ -74,13 +75,13 @@ impl Printed {
         }
     }
 
-    /// Values that round to it.
+    /// Values that round to the printed number.
     pub fn rounded_from(&self) -> Interval {
         let half = self.last_digit() / 2.0;
         Interval { low: self.value - half, high: self.value + half }
     }
 
-    /// Values that round or truncate to it.
+    /// Values that round or truncate to the printed number.
     pub fn read_from(&self) -> Interval {
         let digit = self.last_digit();
         Interval { low: self.value - digit / 2.0, high: self.value + digit }
@@ -106,12 +107,12 @@ impl Serialize for Printed {
 impl Interval {
     const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
-    /// Both ends times a positive factor.
+    /// Multiplies both bounds by a positive factor.
     pub(super) fn scaled(self, factor: f64) -> Self {
         Self { low: self.low * factor, high: self.high * factor }
     }
 
-    /// Intersection; empty if low is not below high.
+    /// Intersection of intervals. It is empty if `low` is not below `high`.
     pub(super) fn common(intervals: impl IntoIterator<Item = Self>) -> Self {
         intervals.into_iter().fold(Self::ALL, |common, one| Self {
             low: common.low.max(one.low),
@@ -125,9 +126,9 @@ impl Interval {
     }
 }
 
-/// Difference of the recomputed from the printed number, percent of the printed one; `None` for a printed zero.
+/// Difference of the recomputed number from the printed one, percent of the printed number; `None` for a printed zero.
 pub(super) fn difference_percent(ours: f64, printed: Printed) -> Option<f64> {
-    // A difference beyond 12 digits is due to rounding, and would show as -0.00.
+    // Differences are rounded, since a rounding error would show as -0.00.
     let percent = (ours / printed.value - 1.0) * 100.0;
     percent.is_finite().then(|| math::round_to_i64(percent * 1e6) as f64 / 1e6)
 }
@@ -152,7 +153,7 @@ impl Line {
         Printed::parse(self.text(column)?).ok_or_else(|| self.wrong(column))
     }
 
-    /// The number of heads of this line; 1 in a table without such a column.
+    /// The number of heads in this line; 1 in a table without that column.
     pub(super) fn heads(&self) -> Result<u8, PaperError> {
         self.text("heads").map_or(Ok(1), |text| text.parse().map_err(|_| self.wrong("heads")))
     }
@@ -162,7 +163,7 @@ impl Line {
     }
 }
 
-/// The lines of a table of the paper, 1 to 5; empty for any other number.
+/// Lines of the paper's table number `table`, from 1 to 5; empty for any other number.
 pub(super) fn lines(table: u8) -> Vec<Line> {
     let text = match table {
         1 => include_str!("table1.csv"),

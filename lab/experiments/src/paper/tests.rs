@@ -10,13 +10,13 @@ fn tables() -> Tables {
     super::tables().unwrap()
 }
 
-/// Names of cells whose printed digits follow neither by rounding nor by truncation.
+/// Names of cells whose printed digits follow neither from rounding nor from truncation.
 fn apart<'a>(cells: impl IntoIterator<Item = (String, &'a Cell)>) -> Vec<String> {
     let cells = cells.into_iter();
     cells.filter(|(_, cell)| cell.digits == Digits::Neither).map(|(name, _)| name).collect()
 }
 
-/// Cells explained only by truncation.
+/// Printed values that follow only from truncation.
 fn truncated<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Vec<f64> {
     let cells = cells.into_iter().filter(|cell| cell.digits == Digits::Truncated);
     cells.map(|cell| cell.printed.value()).collect()
@@ -29,7 +29,7 @@ fn digits_come_from_rounding_or_truncation() {
     assert_eq!(digits("2.67", 2.4 / 0.9), Digits::Rounded);
     assert_eq!(digits("2.33", 1.4 / 0.6), Digits::Both);
     assert_eq!(digits("8", 8.0), Digits::Both);
-    // Just below its exact value.
+    // The recomputed value is just below 0.784.
     assert_eq!(digits("0.784", 0.784 - 1e-12), Digits::Both);
     assert_eq!(digits("0.784", 0.785 - 1e-12), Digits::Neither);
     assert_eq!(digits("0.784", 0.783_499), Digits::Neither);
@@ -48,7 +48,7 @@ fn table_1_matches_to_the_digit() {
         |row: &OverlapRow| [row.overlap_600_khz, row.overlap_1_mhz].map(|cell| cell.printed.value());
     assert_eq!(table.rows.iter().map(printed).collect::<Vec<_>>(), expected);
     let cells = || table.rows.iter().flat_map(|row| [&row.overlap_600_khz, &row.overlap_1_mhz]);
-    // 0 is at best 0.58 truncated to an integer, which is still an erratum.
+    // The printed 0 could be 0.58 truncated to an integer, but it is still an erratum.
     assert_eq!(truncated(cells()), [1.55, 1.16, 0.0]);
     assert_eq!(apart(cells().map(|cell| (cell.printed.to_string(), cell))), [""; 0]);
     let none = table.rows[4].overlap_1_mhz;
@@ -91,7 +91,7 @@ fn means_give_a_consistent_perimeter() {
     assert_eq!(apart(one), ["SLOW", "FAST", "FASTER", "FASTEST"]);
     let Interval { low, high } = tables.consistent_perimeter_m;
     assert!((low - 34.425).abs() < 1e-9 && (high - 34.5).abs() < 1e-9, "{low} to {high}");
-    // For any perimeter of the interval, all means except those of copied rows match to the digit.
+    // For any perimeter in the interval, all means match to the digit except those of copied rows.
     for perimeter_m in [low + 1e-6, high - 1e-6] {
         for line in lines(3).into_iter().chain(lines(4)) {
             let (mode, heads) = (line.text("mode").unwrap(), line.heads().unwrap());
@@ -104,9 +104,9 @@ fn means_give_a_consistent_perimeter() {
     }
 }
 
-/// The head positions in the notes give each printed extreme by Eq. 5 and 6, except errata.
+/// The head positions in the notes give each printed extreme by Eq. 5 and 6, except for errata.
 #[test]
-fn fitting_places_give_the_printed_extremes() {
+fn fitted_head_positions_give_the_printed_extremes() {
     let mut misses = Vec::new();
     for line in lines(3).into_iter().chain(lines(4)) {
         let (mode, heads) = (line.text("mode").unwrap(), line.heads().unwrap());
@@ -136,11 +136,12 @@ fn fitting_places_give_the_printed_extremes() {
     );
 }
 
-/// The worst chord by ray casting equals Eq. 6 with its last step in the farther corner, whose distance yaw increases.
+/// The largest chord by ray casting equals Eq. 6 with the last step in the farther corner. Yaw increases the distance
+/// of that corner.
 #[test]
 fn largest_step_is_at_the_corner() {
     let table = tables().table_3;
-    // The blueprint's mid-height minus 1.65 m; half its base plus 1.5 m, seen at 15 degrees yaw.
+    // Height: the blueprint's mid-height minus 1.65 m. Distance: half the base plus 1.5 m, seen at 15 degrees of yaw.
     let aside_m = 6.449_655 / math::cos(15_f64.to_radians());
     let place = Place { floor_m: 2.701_094, aside_m };
     for (row, step_deg) in table.rows.iter().zip([0.3_f64, 0.6, 0.9, 1.2, 2.4]) {
@@ -176,7 +177,7 @@ fn differing_cells_refer_to_existing_notes() {
         along.into_iter().flatten().chain([r.t_y_mean_m, r.t_y_min_m, r.t_y_max_m])
     });
     for cell in cells.chain(several) {
-        // SLOW's T_x with two heads.
+        // The printed 2.116 is SLOW's T_x with two heads.
         let cut = cell.digits == Digits::Truncated && cell.printed.to_string() == "2.116";
         assert_eq!(cell.note.is_none(), cell.digits.rounded() || cut, "{cell:?}");
         assert!(cell.note.is_none_or(|mark| ('a'..='e').contains(&mark)));

@@ -14,17 +14,17 @@ pub(crate) struct Chain {
     pub diagonal: usize,
     /// Changes of direction from one step to the next.
     pub corners: usize,
-    /// Length with steps of 1 and sqrt 2 pixels (Freeman), m. It is 5 % too long for lines of all directions.
+    /// Length with steps of 1 and sqrt 2 pixels (Freeman), m. On average over all directions it is 5 % too long.
     pub steps_m: f64,
-    /// Length with 0.980, 1.406 and -0.091 for straight steps, diagonal ones and corners, m.
+    /// Length with weights 0.980 for straight steps, 1.406 for diagonal steps and -0.091 for corners, m.
     ///
-    /// It has no bias for long lines of all directions. Source: Vossepoel, Smeulders 1982.
+    /// For long lines it is unbiased on average over all directions. Source: Vossepoel, Smeulders 1982.
     pub corrected_m: f64,
 }
 
-/// Traces a line each of whose pixels has two neighbours.
+/// Traces a closed line in which each pixel has two neighbours.
 ///
-/// Errors: pixels with other than two neighbours, or a line in several pieces.
+/// Errors: a pixel without exactly two neighbours, or a line in several pieces.
 pub(super) fn trace(ring: &Image, pixel_m: f64) -> Result<Chain, PerimeterError> {
     let pixels = ring.pixels();
     let forks = pixels.iter().filter(|p| ring.neighbours(**p) != 2).count();
@@ -49,7 +49,7 @@ pub(super) fn trace(ring: &Image, pixel_m: f64) -> Result<Chain, PerimeterError>
     })
 }
 
-/// Directions from pixel to pixel until back at the first pixel; even ones are straight.
+/// Directions of the steps along the line until it returns to the first pixel. Even directions are straight.
 fn walk(ring: &Image, first: usize) -> Vec<usize> {
     let (mut directions, mut at, mut before) = (Vec::new(), first, None);
     loop {

@@ -5,7 +5,7 @@ use headrace_geometry::math::{self, TAU};
 use super::error::PerimeterError;
 use super::settings::{Ping, Settings};
 
-/// Echoes sorted by angle.
+/// Echoes of a turn, sorted by angle.
 pub(super) struct Echoes {
     angles_rad: Vec<f64>,
     strengths: Vec<Vec<f64>>,
@@ -13,7 +13,7 @@ pub(super) struct Echoes {
 }
 
 impl Echoes {
-    /// Collects pings with any echo within range. Each ping's strongest bin is scaled to one.
+    /// Collects all pings with an echo within range. The strongest bin of each ping is scaled to one.
     pub(super) fn of(pings: &[Ping], settings: &Settings) -> Result<Self, PerimeterError> {
         let mut lines: Vec<(f64, Vec<f64>)> = pings
             .iter()
@@ -35,7 +35,9 @@ impl Echoes {
         Ok(Self { angles_rad, strengths, bin_m: settings.range_max_m / settings.bins as f64 })
     }
 
-    /// Strength at an angle in [0, TAU) and a range, bilinear between pings and bins; zero beyond the last bin.
+    /// Strength at an angle in [0, TAU) and a range; zero beyond the last bin.
+    ///
+    /// The value is interpolated bilinearly between pings and bins.
     pub(super) fn at(&self, angle_rad: f64, range_m: f64) -> f64 {
         let count = self.angles_rad.len();
         let after = self.angles_rad.partition_point(|angle| *angle <= angle_rad);
@@ -57,9 +59,9 @@ impl Echoes {
     }
 }
 
-/// One ping's bins.
+/// Strengths of a ping's bins; `None` without any echo.
 ///
-/// Each ray adds an echo of the pulse's length centred on its range, all with equal area. `None` without any echo.
+/// Each ray adds an echo of the pulse's length, centred on the ray's range. All echoes have equal area.
 fn line(ranges_m: &[f64], settings: &Settings) -> Option<Vec<f64>> {
     let bin_m = settings.range_max_m / settings.bins as f64;
     // An echo shorter than a bin would fall into one or two bins, depending on its position.
@@ -90,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_is_centred_on_its_range_at_every_angle() {
+    fn echo_is_centred_on_its_range_at_every_angle() {
         for range_m in [1.0, 4.003, 9.0] {
             let echoes = turn(range_m);
             for angle in [0.0, 0.01, 3.0, 6.2, TAU - 1e-9] {

@@ -1,13 +1,13 @@
 //! Errors of computing a perimeter.
 
-/// A perimeter can't be computed.
+/// A reason why a perimeter can't be computed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PerimeterError {
     /// Too few angles with an echo around the turn.
     #[error("a perimeter needs echoes at 3 angles or more; there are {count}")]
     TooFewPings {
-        /// Angles with an echo.
+        /// Number of angles with an echo.
         count: usize,
     },
     /// A setting is out of range.
@@ -15,7 +15,7 @@ pub enum PerimeterError {
     Setting {
         /// The setting's name.
         setting: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
         /// Allowed values.
         wanted: &'static str,
@@ -26,7 +26,7 @@ pub enum PerimeterError {
     /// The skeleton still has a fork after pruning and thinning.
     #[error("the wall's skeleton forks at {forks} pixels")]
     Forked {
-        /// Pixels with other than two neighbours.
+        /// Number of pixels without exactly two neighbours.
         forks: usize,
     },
 }

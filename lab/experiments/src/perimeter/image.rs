@@ -5,7 +5,7 @@ use headrace_geometry::math::{self, TAU};
 use super::echo::Echoes;
 use super::settings::Settings;
 
-/// A square image with a border that is never set, so that every set pixel has eight neighbours.
+/// A square image. Pixels on the border are never set, so every set pixel has eight neighbours.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Image {
     pub(super) side: usize,
@@ -18,7 +18,7 @@ impl Image {
         Self { side, set: vec![false; side * side] }
     }
 
-    /// Sets pixels whose centre has an echo of at least the threshold. Columns run to the left, rows up.
+    /// Sets the pixels at whose centre the echo reaches the threshold. Columns run to the left, rows up.
     pub(super) fn of(echoes: &Echoes, settings: &Settings) -> Self {
         let half = math::floor_to_i64(settings.range_max_m / settings.pixel_m) + 2 + settings.grow_px as i64;
         let mut image = Self::empty(crate::index(2 * half + 1));
@@ -43,7 +43,7 @@ impl Image {
         [p + s, p + s + 1, p + 1, p - s + 1, p - s, p - s - 1, p - 1, p + s - 1]
     }
 
-    /// Number of neighbours set.
+    /// Number of set neighbours of a pixel.
     pub(super) fn neighbours(&self, pixel: usize) -> usize {
         self.round(pixel).into_iter().filter(|k| self.set[*k]).count()
     }
@@ -53,7 +53,7 @@ impl Image {
         (0..self.set.len()).filter(|k| self.set[*k]).collect()
     }
 
-    /// Dilates: sets all pixels within `by` of a set one. The border stays clear.
+    /// Dilates the image: sets all pixels within `by` of a set pixel. The border stays clear.
     pub(super) fn grow(&mut self, by: usize) {
         if by == 0 {
             return;
@@ -75,9 +75,9 @@ impl Image {
         }
     }
 
-    /// The set pixels that bound the area around the centre; `None` if that area reaches the border.
+    /// The set pixels that bound the clear area around the centre; `None` if that area reaches the border.
     ///
-    /// Of several components the largest is returned, since specks within the area are bounded too.
+    /// Specks within the area bound it too, so only the largest component is returned.
     pub(super) fn round_the_middle(&self) -> Option<Self> {
         let middle = self.side / 2 * self.side + self.side / 2;
         let mut seen = vec![false; self.set.len()];
@@ -107,7 +107,7 @@ impl Image {
         row == 0 || column == 0 || row == self.side - 1 || column == self.side - 1
     }
 
-    /// The largest 8-connected component; of equal ones the first.
+    /// The largest 8-connected component. Among equally large components, the first one is returned.
     fn largest_piece(&self) -> Option<Self> {
         let mut left = self.clone();
         let mut largest: Vec<usize> = Vec::new();
@@ -124,7 +124,7 @@ impl Image {
         (!largest.is_empty()).then_some(image)
     }
 
-    /// Clears and returns the component of a pixel.
+    /// Clears a pixel's component and returns its pixels.
     fn take_piece(&mut self, from: usize) -> Vec<usize> {
         let (mut piece, mut stack) = (Vec::new(), vec![from]);
         while let Some(pixel) = stack.pop() {

@@ -41,13 +41,14 @@ pub(crate) fn polygon_m(places: &[(f64, f64)]) -> Result<f64, PerimeterError> {
     Ok(sides.map(|(a, b)| math::hypot(b[0] - a[0], b[1] - a[1])).sum())
 }
 
-/// Each ping's angle and least range, as reported by a head that takes the first echo. Pings without echo are omitted.
+/// Angle and smallest range of each ping, as reported by a head that takes the first echo. Pings without an echo are
+/// omitted.
 pub(crate) fn least_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
     let least = |p: &Ping| p.ranges_m.iter().copied().filter(|r| r.is_finite()).fold(f64::INFINITY, f64::min);
     pings.iter().map(|p| (p.angle_rad, least(p))).filter(|(_, range)| range.is_finite()).collect()
 }
 
-/// Each ping's angle and mean range. Pings without echo are omitted.
+/// Angle and mean range of each ping. Pings without an echo are omitted.
 pub(crate) fn mean_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
     let mean = |p: &Ping| {
         let known = p.ranges_m.iter().filter(|r| r.is_finite());
@@ -56,8 +57,8 @@ pub(crate) fn mean_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
     pings.iter().map(|p| (p.angle_rad, mean(p))).filter(|(_, range)| range.is_finite()).collect()
 }
 
-/// Length of the skeleton of the wall's image: echoes interpolated bilinearly over angle and range, thresholded,
-/// thinned, pruned.
+/// Length of the skeleton of the wall's image. Echoes are interpolated bilinearly over angle and range, and the image
+/// is thresholded, thinned and pruned.
 ///
 /// Errors: see [`PerimeterError`].
 /// Source: the paper's §9.2.

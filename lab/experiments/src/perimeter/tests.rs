@@ -3,7 +3,7 @@ use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use super::*;
 
-/// A turn of 1200 pings from a position, each a fan of rays.
+/// Simulates a turn of 1200 pings from a position. Each ping is a fan of rays.
 fn turn(profile: &Profile, from: Yz, beam_deg: f64, rays: u32) -> Vec<Ping> {
     let ping = |k: u32| {
         let angle_rad = f64::from(k) * TAU / 1200.0;
@@ -73,7 +73,7 @@ fn polygon_of_a_square_has_its_perimeter() {
 }
 
 #[test]
-fn gap_is_bridged_by_interpolation_or_reported() {
+fn gap_between_pings_is_bridged_by_interpolation_or_reported() {
     let profile = shapes::circle(4.0).unwrap();
     let mut pings = turn(&profile, [0.0, 4.0], 0.0, 1);
     pings.retain(|p| p.angle_rad > 0.5);

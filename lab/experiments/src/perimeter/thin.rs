@@ -2,7 +2,7 @@
 
 use super::image::Image;
 
-/// Thins every line from both sides to about one pixel, and keeps its middle.
+/// Thins every line from both sides to a middle line about one pixel wide.
 ///
 /// Source: Zhang, Suen, "A fast parallel algorithm for thinning digital patterns", 1984.
 pub(super) fn zhang_suen(image: &mut Image) {
@@ -37,9 +37,10 @@ fn rises(ring: [bool; 8]) -> usize {
     (0..8).filter(|k| !ring[*k] && ring[(k + 1) % 8]).count()
 }
 
-/// Prunes and thins to single lines until neither changes anything.
+/// Prunes and thins the image until neither step changes it, so that only single lines remain.
 ///
-/// The end of a spur may be two pixels that keep each other, and a removed spur may leave a filled corner.
+/// One pass may not suffice. The end of a spur may be two pixels that keep each other, and a removed spur may leave a
+/// filled corner.
 pub(super) fn clean(image: &mut Image) {
     loop {
         let before = image.pixels().len();
@@ -51,9 +52,9 @@ pub(super) fn clean(image: &mut Image) {
     }
 }
 
-/// Removes pixels one by one that aren't ends and that no connection needs.
+/// Removes, one by one, pixels that are no ends and that no connection needs.
 ///
-/// Lines then have no filled corners, and no pixel has more neighbours than the line's shape requires.
+/// The remaining lines have no filled corners, and no pixel has more neighbours than the line's shape requires.
 fn to_single(image: &mut Image) {
     loop {
         let mut changed = false;
@@ -69,16 +70,16 @@ fn to_single(image: &mut Image) {
     }
 }
 
-/// Whether the neighbours of an edge pixel stay connected without it.
+/// Whether the neighbours of an edge pixel stay connected if the pixel is removed.
 fn needless(image: &Image, pixel: usize) -> bool {
     let ring = image.round(pixel).map(|k| image.set[k]);
-    // Yokoi's connectivity number for eight neighbours: runs of clear sides, separated by set corners.
+    // Yokoi's connectivity number for eight neighbours: the number of runs of clear sides, separated by set corners.
     let pieces: usize =
         [0, 2, 4, 6].into_iter().filter(|k| !ring[*k] && (ring[k + 1] || ring[(k + 2) % 8])).count();
     pieces == 1
 }
 
-/// Removes ends until there are none: closed lines and the lines between them remain.
+/// Removes ends until none are left. Closed lines, and lines that connect them, remain.
 fn prune(image: &mut Image) {
     let mut stack = image.pixels();
     while let Some(pixel) = stack.pop() {
@@ -140,7 +141,7 @@ mod tests {
             "...........",
         ]);
         clean(&mut image);
-        // One closed line about row 5, column 4, at most one pixel off at the removed spur.
+        // The remaining closed line is around row 5, column 4. It may be one pixel off at the removed spur.
         let pixels = image.pixels();
         assert!((6..=8).contains(&pixels.len()), "{pixels:?}");
         assert!(pixels.iter().all(|k| image.neighbours(*k) == 2), "{pixels:?}");
@@ -148,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_lose_corners_and_squares_stay_whole() {
+    fn staircase_loses_its_filled_corners_and_stays_closed() {
         let mut image = drawn(&[
             "..........",
             "..####....",

@@ -1,4 +1,4 @@
-//! Quadratic B-splines on a row of cells: their values, and the banded matrices of their integrals.
+//! Quadratic B-splines on a row of cells: values of the splines, and banded matrices of their integrals.
 //!
 //! n cells have n + 2 functions; function i has its support on cells i - 2 to i. Lengths are in cells. Integrals cover
 //! only the existing cells, so the boundary condition is the natural one (no flux).
@@ -45,17 +45,17 @@ impl Band {
         Self { rows }
     }
 
-    /// Integrals of the products of functions.
+    /// Matrix of the integrals of N_row N_column.
     pub(super) fn mass(cells: usize) -> Self {
         Self::assemble(cells, &MASS)
     }
 
-    /// Integrals of the products of their slopes.
+    /// Matrix of the integrals of N_row' N_column'.
     pub(super) fn stiffness(cells: usize) -> Self {
         Self::assemble(cells, &STIFFNESS)
     }
 
-    /// Integrals of the row's slope times the column's function.
+    /// Matrix of the integrals of N_row' N_column.
     pub(super) fn slope(cells: usize) -> Self {
         Self::assemble(cells, &SLOPE)
     }
@@ -65,7 +65,7 @@ impl Band {
         self.rows.get(row).map_or(0.0, |r| r[2])
     }
 
-    /// `target` += this times `source` along one axis of an array `outer x n x inner`.
+    /// Adds this matrix times `source` to `target`, along the middle axis of an array `outer x n x inner`.
     pub(super) fn add_product(&self, inner: usize, source: &[f64], target: &mut [f64]) {
         let n = self.rows.len();
         let slabs = source.chunks_exact(n * inner).zip(target.chunks_exact_mut(n * inner));
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn product_along_the_middle_axis_equals_that_of_each_line() {
+    fn band_product_along_an_axis_equals_the_product_of_each_line() {
         let band = Band::mass(3);
         let source: Vec<f64> = (0..2 * 5 * 3).map(f64::from).collect();
         let mut target = vec![0.0; 30];

@@ -1,4 +1,4 @@
-//! Deviations from the design, interpolated on the unrolled wall: linear over the Delaunay triangles of the samples.
+//! Deviations from the design, interpolated on the unrolled wall: linearly over the Delaunay triangles of the samples.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
@@ -8,7 +8,7 @@ use super::Xyz;
 use super::wall::Stretch;
 use crate::Spread;
 
-/// Coordinates smaller than this become zero, since the triangulation's exact predicates accept none below 1e-142.
+/// Coordinates closer to zero become zero, since the triangulation's exact predicates refuse values below 1e-142.
 const TINY_M: f64 = 1e-100;
 
 /// A sample on the unrolled wall.
@@ -16,14 +16,14 @@ const TINY_M: f64 = 1e-100;
 pub(crate) struct Deviation {
     /// Chainage, m.
     pub x_m: f64,
-    /// Arc length of the design wall on the ray from the reference point through the sample, m.
+    /// Arc length at which the ray from the reference point through the sample meets the design wall, m.
     pub arc_m: f64,
-    /// Distance beyond the design wall on that ray, m.
+    /// Distance of the sample beyond the design wall on that ray, m.
     pub deviation_m: f64,
 }
 
 impl Deviation {
-    /// The deviation of a position in the tunnel.
+    /// The deviation of a position in the tunnel from the design wall.
     pub(crate) fn of(profile: &Profile, place: Xyz) -> Self {
         let centre = profile.reference();
         let direction = [place[1] - centre[0], place[2] - centre[1]];
@@ -49,7 +49,7 @@ impl HasPosition for Vertex {
     }
 }
 
-/// Samples can't be triangulated.
+/// A reason why samples can't be triangulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the samples can't be triangulated: {why}")]
 pub struct ChartError {
@@ -62,17 +62,17 @@ pub(crate) struct Chart {
     perimeter_m: f64,
 }
 
-/// Differences of an interpolated wall from the true one.
+/// Differences of the interpolated wall from the true wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ChartSpread {
     /// Unsigned differences along the ray from the reference point.
     pub spread: Spread,
-    /// Positions outside the samples' hull, which have no value.
+    /// Number of positions outside the samples' hull, which have no interpolated value.
     pub uncovered: usize,
 }
 
 impl Chart {
-    /// Triangulates samples; of two samples at one position the later is used.
+    /// Triangulates samples. If two samples have the same position, the later one is used.
     ///
     /// Errors: a coordinate that isn't finite, or is beyond 1e60.
     pub(crate) fn new(perimeter_m: f64, samples: &[Deviation]) -> Result<Self, ChartError> {
@@ -88,7 +88,7 @@ impl Chart {
         self.triangles.barycentric().interpolate(|vertex| vertex.data().deviation_m, at)
     }
 
-    /// Differences from the true deviations, `reference`(x, arc length) in metres, over a stretch.
+    /// Differences from the true wall over a stretch. `reference` returns the true deviation at (x, arc length), m.
     pub(crate) fn compare(&self, stretch: &Stretch, reference: impl Fn(f64, f64) -> f64) -> ChartSpread {
         let mut uncovered = 0;
         let differences = stretch.places(self.perimeter_m).filter_map(|(x, sigma)| {
@@ -101,9 +101,10 @@ impl Chart {
     }
 }
 
-/// The sample and its image on the other side of the seam.
+/// The sample and its periodic image on the other side of the seam.
 ///
-/// Images extend half a perimeter beyond each side, more than any gap that a triangle could bridge.
+/// The images extend the wall by half a perimeter on either side, which is more than any gap that a triangle could
+/// bridge.
 fn images(perimeter_m: f64, sample: &Deviation) -> [Vertex; 2] {
     let sigma = math::wrap(sample.arc_m, perimeter_m);
     let other = if sigma < perimeter_m / 2.0 { sigma + perimeter_m } else { sigma - perimeter_m };
@@ -141,12 +142,12 @@ mod tests {
     }
 
     #[test]
-    fn wave_around_the_wall_is_matched_up_to_its_curvature() {
+    fn wave_is_interpolated_within_the_curvature_bound() {
         let wave = |_: f64, s: f64| 0.2 * math::sin(s / 20.0 * math::TAU);
         let chart = Chart::new(20.0, &lattice(20.0, wave)).unwrap();
         let stretch = Stretch { from_m: 0.0, to_m: 10.0, step_m: 0.05 };
         let compared = chart.compare(&stretch, wave);
-        // f'' s^2 / 8 for steps of half a metre.
+        // The bound is f'' s^2 / 8 for steps s of half a metre.
         let bound = 0.2 * (math::TAU / 20.0) * (math::TAU / 20.0) * 0.25 / 8.0;
         assert!(compared.spread.max_m < bound * 1.01 && compared.spread.max_m > bound * 0.8, "{compared:?}");
     }
@@ -160,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn place_has_its_given_deviation() {
+    fn position_made_with_a_deviation_has_that_deviation() {
         let profile = shapes::ceran_blueprint().unwrap();
         for k in 0..300 {
             let (sigma, off) = (f64::from(k) * 0.113, math::sin(f64::from(k)) * 0.4);
@@ -171,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn outside_points_missing_and_duplicate_samples_are_handled() {
+    fn chart_has_no_value_outside_its_samples_and_refuses_nan() {
         let chart = Chart::new(20.0, &lattice(20.0, |_, _| 1.0)).unwrap();
         assert_eq!(chart.deviation_m(-0.1, 3.0), None);
         assert_eq!(Chart::new(20.0, &[]).unwrap().deviation_m(1.0, 1.0), None);

@@ -1,18 +1,21 @@
 //! Extracts the zero surface of a field on a grid by marching tetrahedra.
 //!
-//! There are six per cell, all sharing its long diagonal, so that neighbours share faces and no case is ambiguous.
+//! Each cell is split into six tetrahedra that share the cell's long diagonal. Neighbouring tetrahedra therefore share
+//! faces, and no case is ambiguous.
 
 use super::grid::Grid;
 use super::mesh::Mesh;
 use super::{Xyz, along, dot, sub};
 
-/// Corners of a cell are numbered by bits: 1 along x, 2 along y, 4 along z. Each tetrahedron is a path from 0 to 7.
+/// Tetrahedra of a cell, as numbers of their corners. The bits of a number are 1 along x, 2 along y and 4 along z.
+///
+/// Each tetrahedron is a path from corner 0 to corner 7.
 const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
-/// Number of edges that begin at a node: to each other corner of the cell whose least corner it is.
+/// Number of edges that begin at a node. They lead to the other corners of the cell whose least corner is the node.
 const EDGES: usize = 7;
 const NONE: u32 = u32::MAX;
-/// Maximum number of steps of the search along an edge; each at least halves the interval.
+/// Maximum number of steps of the search for a crossing along an edge.
 const STEPS: usize = 24;
 /// Tolerance of an edge crossing, as a share of the edge.
 const CLOSE_ENOUGH: f64 = 1e-6;
@@ -21,7 +24,7 @@ struct Extraction<'a, F> {
     grid: &'a Grid,
     value: F,
     corners: Vec<f64>,
-    /// Vertex on each edge, if created.
+    /// Index of the vertex on each edge; [`NONE`] if the vertex hasn't been created.
     on_edge: Vec<u32>,
     mesh: Mesh,
 }
@@ -101,14 +104,14 @@ impl<F: Fn(Xyz) -> f64> Extraction<'_, F> {
         let slot = corner * EDGES + (to - from) - 1;
         if self.on_edge[slot] == NONE {
             let place = self.crossing(corner, first + self.step(to));
-            // A grid has at most 16 million nodes; the surface crosses far fewer than 4 billion edges.
+            // A grid has at most 16 million nodes, and the surface crosses far fewer than 4 billion edges.
             self.on_edge[slot] = u32::try_from(self.mesh.vertices.len()).unwrap_or(NONE);
             self.mesh.vertices.push(place);
         }
         self.on_edge[slot]
     }
 
-    /// Finds the crossing by false position, with bisection if that converges slowly.
+    /// Finds the crossing of an edge by false position, with a bisection in every third step.
     fn crossing(&self, from: usize, to: usize) -> Xyz {
         let (start, way) = (self.place(from), sub(self.place(to), self.place(from)));
         let (mut low, mut high) = ((0.0, self.corners[from]), (1.0, self.corners[to]));
@@ -140,7 +143,7 @@ mod tests {
     const GRID: Grid = Grid { origin: [-1.5, -1.5, -1.5], cell_m: 0.2, cells: [15, 15, 15] };
 
     #[test]
-    fn a_sphere_is_closed_round_and_faces_outwards() {
+    fn sphere_mesh_is_closed_and_faces_outwards() {
         let sphere = mesh(&GRID, |p| norm(p) - 1.0);
         assert!(sphere.vertices.iter().all(|p| (norm(*p) - 1.0).abs() < 1e-5));
         let mut edges: BTreeMap<(u32, u32), i32> = BTreeMap::new();

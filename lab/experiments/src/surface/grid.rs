@@ -11,33 +11,33 @@ pub(super) struct Grid {
     pub(super) origin: Xyz,
     /// Side of a cell, m.
     pub(super) cell_m: f64,
-    /// Cells along each axis.
+    /// Number of cells along each axis.
     pub(super) cells: [usize; 3],
 }
 
-/// Index of the first of the 27 functions at a position, and their values along each axis.
+/// The 27 functions that are non-zero at a position: index of the first function, and values along each axis.
 pub(super) struct Local {
     first: usize,
     along: [[f64; 3]; 3],
 }
 
 impl Grid {
-    /// Functions along each axis.
+    /// Number of functions along each axis.
     pub(super) fn nodes(&self) -> [usize; 3] {
         self.cells.map(|n| n + 2)
     }
 
-    /// Functions in all.
+    /// Number of functions of the grid.
     pub(super) fn len(&self) -> usize {
         self.nodes().iter().product()
     }
 
-    /// The box with cells twice as large, rounded up for odd numbers of cells.
+    /// The same box with cells twice as large. Odd numbers of cells are rounded up.
     pub(super) fn coarser(&self) -> Self {
         Self { origin: self.origin, cell_m: self.cell_m * 2.0, cells: self.cells.map(|n| n.div_ceil(2)) }
     }
 
-    /// The functions at a position. Outside the box, those of the nearest cell, extrapolated.
+    /// The functions at a position. Outside the box, the functions of the nearest cell are extrapolated.
     pub(super) fn local(&self, place: Xyz) -> Local {
         let mut along = [[0.0; 3]; 3];
         let mut cell = [0_usize; 3];
@@ -52,12 +52,12 @@ impl Grid {
         Local { first: (cell[0] * ny + cell[1]) * nz + cell[2], along }
     }
 
-    /// The field with these coefficients at a position.
+    /// Value of the field with these coefficients at a position.
     pub(super) fn value(&self, field: &[f64], place: Xyz) -> f64 {
         self.gather(&self.local(place), field)
     }
 
-    /// Sum of the coefficients, weighted with the functions' values.
+    /// Sum of the coefficients, weighted by the functions' values.
     pub(super) fn gather(&self, local: &Local, field: &[f64]) -> f64 {
         let [_, ny, nz] = self.nodes();
         let mut sum = 0.0;
@@ -84,15 +84,16 @@ impl Grid {
         }
     }
 
-    /// Adds `amount` times the squares of the functions' values: the diagonal of scatter times gather.
+    /// Adds `amount` times the squares of the functions' values to the coefficients: the diagonal of scatter times
+    /// gather.
     pub(super) fn scatter_squares(&self, local: &Local, amount: f64, field: &mut [f64]) {
         let squares = local.along.map(|line| line.map(|w| w * w));
         self.scatter(&Local { first: local.first, along: squares }, amount, field);
     }
 
-    /// Represents the coarser grid's field exactly on this grid.
+    /// Converts a coarser grid's field exactly to coefficients on this grid.
     ///
-    /// A quadratic B-spline is the sum of four of half its width with the weights 1, 3, 3, 1 over 4.
+    /// A quadratic B-spline is the sum of four B-splines of half its width, with the weights 1/4, 3/4, 3/4 and 1/4.
     pub(super) fn refined(&self, coarse: &Grid, field: &[f64]) -> Vec<f64> {
         let (from, to) = (coarse.nodes(), self.nodes());
         let x = refine_axis(field, 1, from[0], to[0], from[1] * from[2]);

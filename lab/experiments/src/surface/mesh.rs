@@ -13,14 +13,14 @@ pub(crate) struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Triangles sorted into cubic bins, for nearest-triangle queries.
+/// Triangles sorted into cubic bins, to find the triangle nearest to a position.
 #[derive(Debug, Clone)]
 pub(crate) struct MeshIndex<'a> {
     mesh: &'a Mesh,
     origin: Xyz,
     bin_m: f64,
     bins: [i64; 3],
-    /// Start of each bin's triangles in `members`; one more at the end.
+    /// Index in `members` of each bin's first triangle, followed by the length of `members`.
     starts: Vec<usize>,
     members: Vec<u32>,
 }
@@ -29,10 +29,10 @@ pub(crate) struct MeshIndex<'a> {
 const BINS_MAX: f64 = 4e6;
 
 impl MeshIndex<'_> {
-    /// Builds the index with bins of side `bin_m`, m, about that of a triangle.
+    /// Builds the index with bins of side `bin_m`, m. The side should be about that of a triangle.
     ///
-    /// The side is enlarged if there would be too many bins. `None` for a mesh without triangles, with an invalid
-    /// vertex index or a vertex that isn't finite.
+    /// The side is enlarged if there would be too many bins. Returns `None` for a mesh without triangles, with an
+    /// invalid vertex index, or with a vertex that isn't finite.
     pub(crate) fn new(mesh: &Mesh, bin_m: f64) -> Option<MeshIndex<'_>> {
         let known = |t: &[u32; 3]| t.iter().all(|k| (*k as usize) < mesh.vertices.len());
         let finite = |p: &Xyz| p.iter().all(|c| c.is_finite());
@@ -54,7 +54,7 @@ impl MeshIndex<'_> {
         Some(index)
     }
 
-    /// Counts the triangles of each bin, then inserts them.
+    /// Sorts the triangles into bins: counts the triangles of each bin, then inserts them.
     fn sort(&mut self) {
         let count = crate::index(self.bins.iter().product());
         let mut starts = vec![0_usize; count + 1];
@@ -72,7 +72,7 @@ impl MeshIndex<'_> {
         self.members = members;
     }
 
-    /// Calls `call` with each bin that a triangle's bounding box touches.
+    /// Calls `call` with each bin that a triangle's bounding box touches, and with the triangle's number.
     fn each(&self, mut call: impl FnMut(usize, u32)) {
         for (triangle, number) in self.mesh.triangles.iter().zip(0_u32..) {
             let (least, most) = bounds(&triangle.map(|k| self.mesh.vertices[k as usize]));
@@ -98,7 +98,7 @@ impl MeshIndex<'_> {
         within.then(|| crate::index((bin[0] * self.bins[1] + bin[1]) * self.bins[2] + bin[2]))
     }
 
-    /// Distance from a position to the mesh, m. The position must be within about a million bins of it.
+    /// Distance from a position to the mesh, m. The position must be within about a million bins of the mesh.
     pub(crate) fn distance_m(&self, place: Xyz) -> f64 {
         let centre = self.bin(place);
         let outside = centre.iter().zip(&self.bins).map(|(c, n)| (-c).max(c - (n - 1)).max(0));
@@ -106,7 +106,7 @@ impl MeshIndex<'_> {
         let last = centre.iter().zip(&self.bins).map(|(c, n)| (n - 1 - c).max(*c)).max().unwrap_or(0);
         let mut best = f64::INFINITY;
         for shell in first..=last {
-            // Everything in this shell is at least this far away.
+            // All bins of this shell are at least this far away.
             if best <= (shell - 1) as f64 * self.bin_m {
                 break;
             }
@@ -118,14 +118,15 @@ impl MeshIndex<'_> {
         best
     }
 
-    /// Calls `call` with the triangles of the bins whose largest offset from `centre` is `shell`.
+    /// Calls `call` with the triangles of a shell: the bins whose largest offset from `centre` along any axis is
+    /// `shell`.
     fn shell(&self, centre: [i64; 3], shell: i64, mut call: impl FnMut(u32)) {
         let reach =
             |axis: usize| (centre[axis] - shell).max(0)..=(centre[axis] + shell).min(self.bins[axis] - 1);
         for i in reach(0) {
             for j in reach(1) {
                 let on_side = (i - centre[0]).abs() == shell || (j - centre[1]).abs() == shell;
-                // Inside the shell's sides only its two ends along z belong to it.
+                // Between the shell's sides, only the two bins at its ends along z belong to the shell.
                 let step = if on_side || shell == 0 { 1 } else { 2 * shell };
                 let from = if on_side { *reach(2).start() } else { centre[2] - shell };
                 let mut k = from;
@@ -151,13 +152,15 @@ fn bounds(places: &[Xyz]) -> (Xyz, Xyz) {
     (least, most)
 }
 
-/// The point of a triangle nearest to `place`: the foot on its plane if that is inside, otherwise a point on an edge.
+/// The point of a triangle nearest to `place`.
+///
+/// This is the foot on the triangle's plane if the foot is inside the triangle, and otherwise a point on an edge.
 fn nearest_of(place: Xyz, [a, b, c]: [Xyz; 3]) -> Xyz {
     let (u, v, w) = (sub(b, a), sub(c, a), sub(place, a));
     let (uu, uv, vv, uw, vw) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));
     let determinant = uu * vv - uv * uv;
     let (s, t) = ((vv * uw - uv * vw) / determinant, (uu * vw - uv * uw) / determinant);
-    // A triangle without area has no foot: the comparison fails for NaN.
+    // A triangle without area gives NaN, for which the comparison fails.
     if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
         return [0, 1, 2].map(|k| a[k] + s * u[k] + t * v[k]);
     }
@@ -191,7 +194,7 @@ mod tests {
             mesh.vertices.push(super::super::along(base, at(k + 2000, 0.5), 1.0));
             mesh.triangles.push([first, first + 1, first + 2]);
         }
-        // Degenerate: a line, a point and one long sliver.
+        // Degenerate triangles: a line, a point and one long sliver.
         mesh.triangles.push([0, 1, 1]);
         mesh.triangles.push([5, 5, 5]);
         mesh.triangles.push([0, 400, 401]);

@@ -2,11 +2,12 @@
 //!
 //! The samples' normals, spread by B-splines and weighted with the wall area that each represents, form a vector field
 //! V. The field chi minimises the integral of |grad chi - V|^2 plus `point_weight` times (area / samples) times the sum
-//! of chi^2 at the samples. It jumps from negative to positive at the wall. The surface is the level set of its mean at
-//! the samples.
+//! of chi^2 at the samples. The field jumps from negative to positive at the wall. The surface is the level set at the
+//! mean of the field's values at the samples.
 //!
-//! It differs from the paper's tool in one respect: cells of size `depth` fill a box around the samples, while an
-//! octree has coarser ones away from samples. A tunnel is so slim that the whole box is small.
+//! The implementation differs from the paper's tool in one respect: cells of the finest size fill a box around the
+//! samples, while the tool's octree has coarser cells away from samples. A tunnel is so slim that the whole box is
+//! small.
 //!
 //! Source: Kazhdan, Hoppe, "Screened Poisson surface reconstruction", 2013; the paper's §8.2.
 
@@ -17,24 +18,25 @@ use super::mesh::Mesh;
 use super::solver::{Screened, Solved, divergence};
 use super::{Sample, Xyz, extract};
 
-/// Maximum number of functions of a grid, which take about 1.5 GB.
+/// Maximum number of functions of a grid. This number of functions takes about 1.5 GB.
 const NODES_MAX: usize = 16_000_000;
-/// Cells of the density grid are larger by this factor (2 levels, as in Kazhdan's program).
+/// Ratio of the density grid's cells to the finest cells (2 levels, as in Kazhdan's program).
 const DENSITY_CELLS: usize = 4;
 /// Factor by which spreading and reading with quadratic B-splines reduces a density across a wall.
 ///
-/// It is averaged over the position in a cell: the integral of the spline's square.
+/// The factor is averaged over the position in a cell, which gives the integral of the spline's square.
 const ACROSS: f64 = 11.0 / 20.0;
-/// Levels below the finest on which a first solution is computed, and on which normals of sparse samples are spread.
+/// Number of levels below the finest one. A first solution is computed on them, and normals of sparse samples are
+/// spread on them.
 const COARSER_LEVELS: usize = 4;
 
 /// Settings of the reconstruction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub(crate) struct Settings {
-    /// A cell is `scale` times the largest extent of the samples divided by 2^depth; 2 to 12.
+    /// Depth d: a cell is `scale` times the largest extent of the samples, divided by 2^d; 2 to 12.
     pub depth: u32,
-    /// Weight of passing through the samples; 0 to 1000.
+    /// Weight of the constraint that the surface passes through the samples; 0 to 1000.
     pub point_weight: f64,
     /// Normals are spread in cells large enough to hold about this many samples; above 0.
     pub samples_per_node: f64,
@@ -49,8 +51,8 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// The paper's settings: depth 8, one sample per node, point weight 5 (§8.2), and the cube 1.1 times the samples,
-    /// as in its tool.
+    /// The paper's settings: depth 8, one sample per node, point weight 5 (§8.2), and a cube of 1.1 times the samples'
+    /// extent, as in the paper's tool.
     pub(crate) fn of_paper() -> Self {
         Self {
             depth: 8,
@@ -64,20 +66,20 @@ impl Settings {
     }
 }
 
-/// A surface can't be made.
+/// A reason why a surface can't be made.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoissonError {
     /// The samples don't span a volume.
     #[error("a surface needs at least 4 samples with some extent; there are {count}")]
     TooFewSamples {
-        /// Samples given.
+        /// Number of samples.
         count: usize,
     },
     /// A position or normal isn't finite.
     #[error("sample {index} has a position or normal that isn't a number")]
     NotFinite {
-        /// Its index, from zero.
+        /// Index of the sample, from zero.
         index: usize,
     },
     /// A setting is out of range.
@@ -85,7 +87,7 @@ pub enum PoissonError {
     Setting {
         /// The setting's name.
         setting: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
         /// Allowed values.
         wanted: &'static str,
@@ -95,7 +97,7 @@ pub enum PoissonError {
         "the grid would have {nodes:.0} nodes; at most {NODES_MAX} are allowed; a smaller depth needs fewer"
     )]
     TooLarge {
-        /// Nodes needed.
+        /// Number of nodes needed.
         nodes: f64,
     },
     /// The solver hasn't converged within its step limit.
@@ -108,7 +110,7 @@ pub enum PoissonError {
     },
 }
 
-/// A field whose level set is the surface.
+/// A field, and the level at which it defines the surface.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     grid: Grid,
@@ -116,12 +118,12 @@ pub(crate) struct Surface {
     level: f64,
 }
 
-/// Samples with the wall area they represent.
+/// Samples, with the wall area that each sample represents.
 struct Cloud<'a> {
     samples: &'a [Sample],
     /// Wall area of each sample, m^2.
     areas_m2: Vec<f64>,
-    /// Levels above the finest at which each normal is spread.
+    /// Levels by which the level for spreading each normal is coarser than the finest level.
     coarser: Vec<usize>,
     area_m2: f64,
 }
@@ -135,7 +137,7 @@ impl Surface {
         let grid = grid_round(samples, settings)?;
         let cloud = Cloud::measure(samples, &grid, settings.samples_per_node);
         let (field, Solved { steps, residual }) = solve(&grid, &cloud, settings, COARSER_LEVELS);
-        // The solver reaches the tolerance up to rounding.
+        // The solver reaches the tolerance except for rounding.
         if residual > settings.tolerance * (1.0 + 1e-9) {
             return Err(PoissonError::NotSolved { steps, residual });
         }
@@ -144,7 +146,7 @@ impl Surface {
         Ok(Self { grid, field, level: sum / cloud.area_m2 })
     }
 
-    /// The field: positive towards the water, negative behind the wall. The step across the wall is about one.
+    /// Value of the field: positive towards the water, negative behind the wall. The step across the wall is about one.
     pub(crate) fn value(&self, place: Xyz) -> f64 {
         self.grid.value(&self.field, place) - self.level
     }
@@ -194,7 +196,7 @@ fn grid_round(samples: &[Sample], settings: &Settings) -> Result<Grid, PoissonEr
     }
     let cell_m = settings.scale * largest / f64::from(1_u32 << settings.depth);
     let margin = settings.margin_cells as f64;
-    // Whole cells, with the samples centred.
+    // The box has whole cells, with the samples centred.
     let cells = extents.map(|extent| (extent / cell_m).ceil() + 2.0 * margin);
     let nodes: f64 = cells.iter().map(|n| n + 2.0).product();
     if nodes > NODES_MAX as f64 {
@@ -205,8 +207,8 @@ fn grid_round(samples: &[Sample], settings: &Settings) -> Result<Grid, PoissonEr
 }
 
 impl<'a> Cloud<'a> {
-    /// Assigns each sample its area: one of k samples in a patch represents a k-th of it. Patches are the cells of a
-    /// coarser grid.
+    /// Assigns an area to each sample: one of k samples in a patch represents a k-th of the patch. Patches are the
+    /// cells of a coarser grid.
     fn measure(samples: &'a [Sample], grid: &Grid, samples_per_node: f64) -> Self {
         let patches = Grid {
             origin: grid.origin,
@@ -227,13 +229,14 @@ impl<'a> Cloud<'a> {
         Self { samples, areas_m2, coarser, area_m2 }
     }
 
-    /// Coefficients of V on a grid `level` levels above the finest, from the samples spread there or above.
+    /// Coefficients of V on a grid that is `level` levels coarser than the finest grid. Samples spread on coarser
+    /// levels are included.
     ///
-    /// `finest` is the level being solved, below which no sample is spread.
+    /// `finest` is the level being solved. Samples are not spread on levels finer than this.
     fn normals(&self, grid: &Grid, level: usize, finest: usize) -> [Vec<f64>; 3] {
         let mut field = if level < COARSER_LEVELS && self.coarser.iter().any(|c| *c > level) {
             let coarse = grid.coarser();
-            // A slope per cell is halved in cells half as large.
+            // A slope per cell is half as large in cells half as large.
             self.normals(&coarse, level + 1, finest).map(|values| {
                 let halved: Vec<f64> = values.iter().map(|v| v / 2.0).collect();
                 grid.refined(&coarse, &halved)
@@ -254,12 +257,14 @@ impl<'a> Cloud<'a> {
     }
 }
 
-/// Levels above a grid with `per_cell` samples per cell at which a cell has at least `wanted`.
+/// Number of levels by which a grid with `per_cell` samples per cell must be coarsened until a cell has at least
+/// `wanted` samples.
 fn levels_up(per_cell: f64, wanted: f64) -> usize {
     (0..COARSER_LEVELS).take_while(|level| per_cell * f64::from(1_u32 << (2 * level)) < wanted).count()
 }
 
-/// Coefficients of the field, and the solver's outcome. Coarser grids give a first solution.
+/// Solves for the coefficients of the field; also returns the solver's outcome. The solution on a coarser grid is the
+/// initial value.
 fn solve(grid: &Grid, cloud: &Cloud<'_>, settings: &Settings, coarser: usize) -> (Vec<f64>, Solved) {
     let level = COARSER_LEVELS - coarser;
     let mut field = if coarser > 0 && grid.cells.iter().all(|n| *n >= 8) {

@@ -33,7 +33,7 @@ pub(super) struct Solved {
 }
 
 impl<'a> Screened<'a> {
-    /// Creates the left-hand side; `weight` is that of one sample, in units of cells.
+    /// Creates the left-hand side; `weight` is the weight of one sample, in units of cells.
     pub(super) fn new(grid: &'a Grid, samples: Vec<Local>, weight: f64) -> Self {
         let mut system = Self {
             grid,
@@ -71,7 +71,8 @@ impl<'a> Screened<'a> {
         Scratch { mass_z: zeros(), stiffness_z: zeros(), mass_yz: zeros(), stiffness_yz: zeros() }
     }
 
-    /// `target` = left-hand side times `field`. The Laplacian is Kx My Mz + Mx Ky Mz + Mx My Kz, axis by axis.
+    /// Sets `target` to the left-hand side times `field`. The Laplacian is Kx My Mz + Mx Ky Mz + Mx My Kz, computed
+    /// axis by axis.
     fn apply(&self, field: &[f64], target: &mut [f64], scratch: &mut Scratch) {
         let [_, ny, nz] = self.grid.nodes();
         let Scratch { mass_z, stiffness_z, mass_yz, stiffness_yz } = scratch;
@@ -91,7 +92,7 @@ impl<'a> Screened<'a> {
         }
     }
 
-    /// Improves `field` until the residual is `tolerance` of the right-hand side, or after `steps_max` steps.
+    /// Improves `field` until the residual is at most `tolerance` times the right-hand side, or for `steps_max` steps.
     pub(super) fn solve(&self, rhs: &[f64], field: &mut [f64], tolerance: f64, steps_max: usize) -> Solved {
         let mut scratch = self.scratch();
         let mut image = vec![0.0; field.len()];
@@ -122,7 +123,8 @@ impl<'a> Screened<'a> {
     }
 }
 
-/// The right-hand side: integrals of a vector field, given by its coefficients, times the functions' gradients.
+/// The right-hand side: integrals of a vector field times the functions' gradients. `field` has the vector field's
+/// coefficients.
 pub(super) fn divergence(grid: &Grid, field: &[Vec<f64>; 3]) -> Vec<f64> {
     let [_, ny, nz] = grid.nodes();
     let inner = [ny * nz, nz, 1];

@@ -9,21 +9,21 @@ use crate::Spread;
 /// A stretch of wall, evaluated on a lattice of positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stretch {
-    /// Start along the tunnel, m.
+    /// Chainage of the start, m.
     pub from_m: f64,
-    /// End, m.
+    /// Chainage of the end, m.
     pub to_m: f64,
     /// Lattice spacing along the tunnel and around it, m; above 0.
     ///
-    /// The paper doesn't state its own. 0.1 is fine compared with a beam's step; 0.2 gives the same figures four times
-    /// as fast.
+    /// The paper doesn't state its spacing. 0.1 is fine compared with a beam's step; 0.2 gives the same figures four
+    /// times as fast.
     pub step_m: f64,
 }
 
 impl Stretch {
-    /// Chainages and arc lengths of its positions, x outermost.
+    /// Chainages and arc lengths of the lattice's positions, in the order of chainage.
     ///
-    /// Chainages are whole steps from `from_m`. The number of positions around the wall divides it evenly.
+    /// Chainages are whole steps from `from_m`. Around the wall, positions are evenly spaced by about one step.
     pub(crate) fn places(&self, perimeter_m: f64) -> impl Iterator<Item = (f64, f64)> + use<> {
         let Self { from_m, to_m, step_m } = *self;
         let along = math::floor_to_i64((to_m - from_m) / step_m + 1e-9).max(-1);
@@ -34,8 +34,9 @@ impl Stretch {
     }
 }
 
-/// The position at a chainage and arc length on a wall with deviation `deviation_m` from its design along the ray from the
-/// reference point, outwards positive.
+/// The position at a chainage and arc length on a displaced wall.
+///
+/// `deviation_m` is the displacement from the design along the ray from the reference point, outwards positive.
 pub(crate) fn place(profile: &Profile, x_m: f64, arc_m: f64, deviation_m: f64) -> Xyz {
     let (centre, wall) = (profile.reference(), profile.point_at(arc_m));
     let out = [wall[0] - centre[0], wall[1] - centre[1]];
@@ -43,8 +44,8 @@ pub(crate) fn place(profile: &Profile, x_m: f64, arc_m: f64, deviation_m: f64) -
     [x_m, centre[0] + scale * out[0], centre[1] + scale * out[1]]
 }
 
-/// Unsigned distances from positions on the true wall to a surface. `reference` gives the
-/// wall's deviation from the design at (x, arc length), m.
+/// Absolute distances from positions on the true wall to a surface. `reference` returns the true wall's deviation from
+/// the design at (x, arc length), m.
 pub(crate) fn from_wall(
     profile: &Profile,
     surface: &MeshIndex<'_>,
@@ -62,7 +63,7 @@ mod tests {
     use super::super::Mesh;
     use super::*;
 
-    /// The design's tube, offset outwards by `off_m` along rays.
+    /// The design's tube, displaced outwards by `off_m` along rays from the reference point.
     fn tube(profile: &Profile, off_m: f64) -> Mesh {
         let (rings, round) = (41_u32, 720_u32);
         let at = |i: u32, k: u32| {
@@ -91,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn places_cover_exactly_the_stretch() {
+    fn lattice_covers_exactly_the_stretch() {
         let stretch = Stretch { from_m: 10.0, to_m: 11.0, step_m: 0.1 };
         let places: Vec<_> = stretch.places(5.02).collect();
         assert_eq!(places.len(), 11 * 50);

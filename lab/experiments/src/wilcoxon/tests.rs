@@ -31,7 +31,7 @@ const CRITICAL: [(usize, [usize; 4]); 26] = [
     (30, [151, 137, 120, 109]),
 ];
 const ALPHAS: [f64; 4] = [0.10, 0.05, 0.02, 0.01];
-/// No value of W is small enough.
+/// No value of W reaches the significance level.
 const NONE: usize = 99;
 
 #[test]
@@ -50,7 +50,7 @@ fn critical_values_match_published_ones() {
 
 #[test]
 fn ten_pairs_with_a_rank_sum_of_eight_have_the_exact_p() {
-    // 1 to 10 with the ranks 3 and 5 positive.
+    // The differences are 1 to 10; ranks 3 and 5 are positive, the others negative.
     let differences: Vec<f64> =
         (1..=10).map(|k| if k == 3 || k == 5 { f64::from(k) } else { -f64::from(k) }).collect();
     let test = of_differences(&differences, Options::default()).unwrap();
@@ -59,7 +59,7 @@ fn ten_pairs_with_a_rank_sum_of_eight_have_the_exact_p() {
     assert!((test.p_less - 25.0 / 1024.0).abs() < 1e-15);
 }
 
-/// W+ of all sign choices, with the given ties and zeros.
+/// W+ for all choices of signs, for the given ranks.
 fn all_choices(ranks: &[f64]) -> Vec<f64> {
     (0..1_u32 << ranks.len())
         .map(|signs| ranks.iter().enumerate().filter(|(k, _)| signs >> k & 1 == 1).map(|(_, r)| r).sum())
@@ -107,7 +107,7 @@ fn mean_and_variance_with_ties_and_zeros_match_all_sign_choices() {
 
 #[test]
 fn tie_correction_matches_the_textbook() {
-    // n (n + 1) (2 n + 1) / 24 minus the sum of (t^3 - t) / 48.
+    // The variance is n (n + 1) (2 n + 1) / 24 minus the sum of (t^3 - t) / 48.
     let values = [1.0, 1.0, 1.0, -2.0, 2.0, 4.0, -5.0, 5.0, 5.0, 5.0];
     let test = of_differences(&values, Options::default()).unwrap();
     let variance = 10.0 * 11.0 * 21.0 / 24.0 - (24.0 + 6.0 + 60.0) / 48.0;
@@ -116,7 +116,7 @@ fn tie_correction_matches_the_textbook() {
 }
 
 #[test]
-fn normal_approximation_starts_at_51_pairs_close_to_exact() {
+fn normal_approximation_starts_at_51_pairs_and_is_close_to_the_exact_p() {
     let differences = |n: i32| -> Vec<f64> {
         (1..=n).map(|k| if k % 3 == 0 { -f64::from(k) } else { f64::from(k) }).collect()
     };
@@ -142,7 +142,7 @@ fn sign_choices_of_50_pairs_are_counted_exactly() {
 }
 
 #[test]
-fn reordering_and_swapping_have_their_expected_effect() {
+fn swapping_the_pairs_swaps_w_plus_and_w_minus() {
     let (left, right) = ([1.0, 2.5, 3.0, 9.0, 4.0], [1.1, 2.0, 1.0, 3.0, 4.9]);
     let test = of_pairs(&left, &right, Options::default()).unwrap();
     let swapped = of_pairs(&right, &left, Options::default()).unwrap();

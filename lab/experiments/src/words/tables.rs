@@ -30,10 +30,10 @@ pub fn words(tables: &Tables) -> String {
     text
 }
 
-/// The header lines of a block of rows, and the format of a row.
+/// Header lines of a block of columns, and a function that formats a row.
 type Block<'a, Row> = (String, &'a dyn Fn(&Row) -> String);
 
-/// Adds a table: title, rows once per block of columns, notes.
+/// Appends a table: its title, the rows once for each block of columns, and the notes.
 fn show<Row>(text: &mut String, table: &Table<Row>, blocks: &[Block<'_, Row>]) {
     let mut line = |words: &str| {
         text.push_str(words.trim_end());
@@ -66,12 +66,12 @@ fn wrapped(note: &Note) -> Vec<String> {
     lines
 }
 
-/// A line of titles, each over a group of columns `width` wide, after `before`.
+/// A line of titles after `before`. Each title is over a group of columns, `width` characters wide.
 fn titles(before: &str, groups: &[&str], width: usize) -> String {
     groups.iter().fold(before.to_owned(), |line, group| format!("{line}  {group:<0$}", width - 2))
 }
 
-/// Column headings of a cell, for each of `count` groups, below their titles and after `before`.
+/// Column headings after `before`, repeated for each of `count` groups.
 fn heads(before: &str, group: &str, count: usize) -> String {
     format!("{before}{}", group.repeat(count))
 }
@@ -136,7 +136,7 @@ fn combined_head(layout: &str) -> String {
     format!("  {layout}; pred.: predicted by the baseline\n{top}\n{}", heads("  mode    s", COMBINED, 3))
 }
 
-/// Two columns: from the experiments, then as predicted.
+/// Headings of the columns from the experiments and of the predicted columns.
 const COMBINED: &str = "  paper   ours     %  pred.     %";
 
 fn combined(row: &CombinedRow, layout: &Combined) -> String {
@@ -168,7 +168,7 @@ fn ours(cell: &Cell, decimals: usize) -> String {
     format!("{:>8.decimals$}{:>7} {}", cell.ours, percent(cell), sign(cell))
 }
 
-/// The difference with about three digits.
+/// The difference in percent, with about three digits.
 fn percent(cell: &Cell) -> String {
     match cell.difference_percent {
         None => "-".to_owned(),
@@ -178,7 +178,7 @@ fn percent(cell: &Cell) -> String {
     }
 }
 
-/// The mark of the note that a cell refers to, or otherwise of how its printed digits follow.
+/// The mark of the note on a cell. A cell without a note has a mark that states how its printed digits follow.
 fn sign(cell: &Cell) -> char {
     cell.note.unwrap_or(match cell.digits {
         Digits::Both => '=',

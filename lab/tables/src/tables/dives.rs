@@ -5,13 +5,13 @@ use headrace_monitor::report::Report;
 use crate::column::{Column, Get, Table, count};
 use crate::replay::Dive;
 
-/// Facts about a log.
+/// A log, for a row of the table.
 pub(crate) struct Row<'a> {
     pub(crate) log: &'a str,
     pub(crate) sha256: &'a str,
     pub(crate) parameters: &'a str,
     pub(crate) version: &'a str,
-    /// The dive, or the reason why there is none.
+    /// The dive, or the reason why the log couldn't be replayed.
     pub(crate) dive: Result<&'a Dive, &'a str>,
 }
 
@@ -34,7 +34,7 @@ fn exit_code(row: &Row<'_>) -> i64 {
     }
 }
 
-/// UTC of a time on the log's clock, microseconds.
+/// Converts the dive's start from the log's clock to UTC, microseconds.
 fn utc_us(row: &Row<'_>) -> Option<i64> {
     let dive = row.dive.ok()?;
     #[expect(clippy::cast_possible_truncation, reason = "a start in seconds is far below 2^63 nanoseconds")]
@@ -42,7 +42,7 @@ fn utc_us(row: &Row<'_>) -> Option<i64> {
     Some(dive.about.utc_of_zero_ns?.checked_add(start_ns)? / 1000)
 }
 
-/// A column of the report.
+/// A column whose value is taken from the report.
 macro_rules! of_report {
     (number $name:literal, $about:literal, $get:expr) => {
         Column(

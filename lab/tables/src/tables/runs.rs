@@ -5,7 +5,7 @@ use headrace_monitor::report::{Report, ReturnReport, RunReport};
 use super::sections::words;
 use crate::column::{Column, Get, Table, count};
 
-/// A run and, if it is open, the way back to it.
+/// A run and, if the run is open, how to return to it.
 pub(crate) struct Run<'a> {
     run: &'a RunReport,
     back: Option<&'a ReturnReport>,

@@ -17,7 +17,7 @@ fn causes(row: &SectionReport) -> Option<String> {
     evidence(row).map(|evidence| words(evidence.causes.iter()))
 }
 
-/// Names of causes, the main one first.
+/// Joins the names of causes, the main cause first.
 pub(super) fn words(causes: impl IntoIterator<Item = headrace_coverage::Cause>) -> String {
     causes.into_iter().map(headrace_coverage::Cause::as_str).collect::<Vec<_>>().join(",")
 }
@@ -138,7 +138,7 @@ pub(crate) fn sections() -> Table<SectionReport> {
     }
 }
 
-/// A hole, and the sections that have it as their largest.
+/// A hole, with the adjacent sections whose largest hole it is.
 pub(crate) struct Hole<'a> {
     section: &'a SectionReport,
     end_m: f64,

@@ -12,19 +12,19 @@ pub const COMMAND_BYTES: usize = 27;
 pub const RANGES_M: [u8; 13] = [1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100];
 
 const HEADER: [u8; 2] = [0xFE, 0x44];
-/// Terminates a command and must not occur elsewhere in it.
+/// Terminates a command. The value must not occur elsewhere in the command.
 const TERMINATOR: u8 = 0xFD;
-/// Transmit (bit 0), send data (bit 1), slave (bit 6).
+/// Command bits: transmit (bit 0), send data (bit 1), slave (bit 6).
 const SLAVE: u8 = 0x43;
 const REVERSE: u8 = 0x40;
-/// Reply rate code of 115200 baud; other codes aren't known.
+/// Reply rate code for 115200 baud. No other code is known.
 const UP_BAUD: u8 = 0x06;
 const STEP_CODES: [u8; 6] = [0, 1, 2, 3, 4, 8];
 
 /// Number of echo points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Points {
-    /// 250 points nominally, of which 8-bit returns (`IMX`) carry 252.
+    /// Nominally 250 points. Returns with 8-bit points (`IMX`) have 252.
     P250,
     /// 500 points (`IGX`).
     P500,
@@ -37,17 +37,17 @@ pub struct Command {
     pub head_id: u8,
     /// Range setting, m: one of [`RANGES_M`].
     pub range_m: u8,
-    /// Reverses the stepping direction, once.
+    /// Whether the head reverses its stepping direction, once.
     pub reverse: bool,
     /// Gain at the start of the ping, 0 to 40 dB.
     pub start_gain_db: f64,
     /// Slope of the time-varied gain: 10, 20, 30 or 40 dB per decade of range.
     pub logf_db: f64,
-    /// Absorption compensated by the gain, 0 to 2.55 dB/m but not 2.53.
+    /// Absorption that the gain compensates, 0 to 2.55 dB/m but not 2.53.
     pub absorption_dbpm: f64,
     /// Centre of the sector in the head's own angles, -180 to 180 degrees in steps of 3.
     pub train_deg: f64,
-    /// Width of the sector, 0 to 360 degrees in steps of 3; 360 rotates continuously.
+    /// Width of the sector, 0 to 360 degrees in steps of 3. With 360 the head rotates continuously.
     pub sector_deg: f64,
     /// Step to the next ping: 0, 0.3, 0.6, 0.9, 1.2 or 2.4 degrees.
     pub step_deg: f64,
@@ -57,11 +57,11 @@ pub struct Command {
     pub min_range_m: f64,
     /// Number of echo points.
     pub points: Points,
-    /// Depth of an echo point: 4, 8 or 16 bits.
+    /// Number of bits of an echo point: 4, 8 or 16.
     pub data_bits: u8,
-    /// Requests the profile point only (`IPX`).
+    /// Whether the return has the profile point only (`IPX`).
     pub profile: bool,
-    /// Makes the head calibrate its zero.
+    /// Whether the head calibrates its zero.
     pub calibrate: bool,
     /// Delay before the head answers, 0 to 510 ms in steps of 2, but not 506.
     pub switch_delay_ms: f64,
@@ -69,46 +69,46 @@ pub struct Command {
     pub frequency_khz: f64,
 }
 
-/// Reason why settings can't be encoded, or bytes can't be decoded.
+/// A reason why settings can't be encoded, or bytes can't be decoded.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CommandError {
-    /// A setting outside the head's range.
+    /// A setting is outside the head's range.
     #[error("switch command: {field} of {value} {unit}; allowed is {least} to {most} {unit}")]
     Outside {
         /// Name of the setting.
         field: &'static str,
-        /// Value.
+        /// Value of the setting.
         value: f64,
-        /// Its unit.
+        /// Unit of the setting.
         unit: &'static str,
         /// Minimum.
         least: f64,
         /// Maximum.
         most: f64,
     },
-    /// A setting that isn't one of the allowed values.
+    /// A setting isn't one of the allowed values.
     #[error("switch command: {field} of {value}; allowed are {allowed}")]
     NotListed {
         /// Name of the setting.
         field: &'static str,
-        /// Value.
+        /// Value of the setting.
         value: f64,
         /// Allowed values.
         allowed: &'static str,
     },
-    /// A setting whose code would terminate the command early.
+    /// The code of a setting would terminate the command early.
     #[error(
         "switch command: byte {index} would be 0xFD, which is allowed only at the end; choose a neighbouring value of the setting"
     )]
     EarlyTerminator {
-        /// Index in the command.
+        /// Index of the code in the command.
         index: usize,
     },
-    /// Wrong value of a constant byte.
+    /// A constant byte has the wrong value.
     #[error("switch command: byte {index} is {got:#04X}; allowed is {wanted:#04X}")]
     Fixed {
-        /// Index in the command.
+        /// Index of the byte in the command.
         index: usize,
         /// Actual value.
         got: u8,
@@ -119,7 +119,7 @@ pub enum CommandError {
 
 /// Linear scale of a byte: value = zero + code * num / den.
 ///
-/// A fraction, because a product with 0.3 or 0.01 is off by an ulp for some codes.
+/// The factor is a fraction, since a product with 0.3 or 0.01 is off in the last place for some codes.
 struct Scale {
     field: &'static str,
     unit: &'static str,
@@ -139,7 +139,7 @@ impl Scale {
         self.zero + f64::from(code) * self.num / self.den
     }
 
-    /// Nearest code of a value.
+    /// Code nearest to a value.
     fn code(&self, value: f64) -> Result<u8, CommandError> {
         let code = math::round_to_i64((value - self.zero) * self.den / self.num);
         match u8::try_from(code) {
@@ -154,7 +154,7 @@ impl Scale {
         }
     }
 
-    /// Value of a received code, range-checked.
+    /// Value of a received code. The code's range is checked.
     fn checked(&self, code: u8) -> Result<f64, CommandError> {
         self.code(self.value(code)).map(|_| self.value(code))
     }
@@ -174,7 +174,7 @@ const FREQUENCY: Scale = Scale { zero: 175.0, least: 21, ..Scale::new("frequency
 impl Command {
     /// Encodes the command.
     ///
-    /// Errors: a setting without a code, or with code 0xFD.
+    /// Errors: a setting has no code, or has the code 0xFD.
     pub fn encode(&self) -> Result<[u8; COMMAND_BYTES], CommandError> {
         let [fe, d] = HEADER;
         let bytes = [
@@ -212,7 +212,7 @@ impl Command {
         }
     }
 
-    /// Decodes a command. Anything not understood is an error, including non-zero reserved bytes.
+    /// Decodes a command. Unknown content is an error, including non-zero reserved bytes.
     ///
     /// Errors: a wrong constant byte, or an undefined code.
     pub fn decode(bytes: &[u8; COMMAND_BYTES]) -> Result<Self, CommandError> {
@@ -281,12 +281,12 @@ impl Command {
     }
 }
 
-/// Step of `counts` counts of 0.3 degrees, in degrees.
+/// Size of a step of `counts` counts of 0.3 degrees, in degrees.
 pub(crate) fn step_deg(counts: u8) -> f64 {
     STEP.value(counts)
 }
 
-/// Largest step supported by the head that is at most `counts` counts.
+/// Largest step supported by the head that has at most `counts` counts.
 pub(crate) fn step_at_most(counts: i32) -> u8 {
     STEP_CODES.into_iter().rfind(|code| i32::from(*code) <= counts).unwrap_or(0)
 }
@@ -326,7 +326,7 @@ fn decode_switch(field: &'static str, code: u8) -> Result<bool, CommandError> {
     }
 }
 
-/// Framing of commands in the stream from host to head.
+/// Separates commands in the stream from host to head.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Commands;
 

@@ -16,5 +16,5 @@ pub const COUNTS_PER_TURN: i32 = 1200;
 /// Position count at 0 degrees. Source: Imagenex 881A serial interface, head position.
 pub const ZERO_COUNT: i32 = 600;
 
-/// Speed of sound used by the family for every range. Source: Imagenex 881A serial interface, profile range.
+/// Speed of sound that the family assumes for every range, m/s. Source: Imagenex 881A serial interface, profile range.
 pub const SOUND_SPEED_MPS: f64 = 1500.0;

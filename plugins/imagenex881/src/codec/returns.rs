@@ -1,4 +1,4 @@
-//! Returns: 12 bytes of header, the echo, and 0xFC. Shared by the 881 heads and the 852 sounder.
+//! Returns: 12 bytes of header, the echo, and 0xFC. The 881 heads and the 852 sounder use the same format.
 //!
 //! Source: Imagenex 881A serial interface, return data; Imagenex 852 serial interface specification 1.04.
 
@@ -17,15 +17,15 @@ const MAX_ECHO: u16 = 500;
 const HEADER_BYTES: usize = 12;
 const TERMINATOR: u8 = 0xFC;
 const CLOCKWISE: u8 = 0x40;
-/// Smallest range setting with counts of 1 cm.
+/// Smallest range setting whose counts are 1 cm.
 const COARSE_FROM_M: u8 = 5;
 
 /// Type of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tag {
-    /// Echo at the 25-point setting.
+    /// `IMX`: echo at the 25-point setting.
     Imx,
-    /// Echo at the 50-point setting.
+    /// `IGX`: echo at the 50-point setting.
     Igx,
     /// GS model, with attitude sensors.
     Ipx,
@@ -40,7 +40,7 @@ pub enum Tag {
 impl Tag {
     const ALL: [Self; 6] = [Self::Imx, Self::Igx, Self::Ipx, Self::Ina, Self::Inb, Self::Inc];
 
-    /// Three letters on the wire.
+    /// The tag's three letters on the wire.
     pub const fn letters(self) -> [u8; 3] {
         match self {
             Self::Imx => *b"IMX",
@@ -52,7 +52,7 @@ impl Tag {
         }
     }
 
-    /// True for GS models, which add fields behind the common header, known from one source only.
+    /// Whether the return is from a GS model. GS models add fields after the common header, known from one source only.
     pub const fn is_gs(self) -> bool {
         matches!(self, Self::Ina | Self::Inb | Self::Inc)
     }
@@ -62,17 +62,17 @@ impl Tag {
     }
 }
 
-/// Device model of a return; the formats of position and profile range differ.
+/// Device model of a return. The formats of position and profile range depend on the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
-    /// A rotating head: positions 0 to 1200; 2 or 10 mm per count.
+    /// A rotating head: positions are 0 to 1200, and a count is 2 or 10 mm.
     Head881,
-    /// The 852 echosounder: 13-bit positions without a meaning; always 10 mm per count.
+    /// The 852 echosounder: positions have 13 bits and no meaning, and a count is always 10 mm.
     Sounder852,
 }
 
 impl Model {
-    /// Model by default head id: 0x11 to 0x15 are sounders.
+    /// Model that uses this head id by default: sounders use 0x11 to 0x15.
     pub const fn of_head_id(head_id: u8) -> Self {
         if matches!(head_id, 0x11..=0x15) { Self::Sounder852 } else { Self::Head881 }
     }
@@ -83,12 +83,12 @@ impl Model {
 pub struct Status(pub u8);
 
 impl Status {
-    /// True if the head accepted the settings of the command.
+    /// Whether the head accepted the settings of the command.
     pub const fn accepted(self) -> bool {
         self.0 & 0x40 != 0
     }
 
-    /// True if the head lost characters of the command.
+    /// Whether the head lost characters of the command.
     pub const fn overrun(self) -> bool {
         self.0 & 0x80 != 0
     }
@@ -103,9 +103,9 @@ pub struct Header {
     pub head_id: u8,
     /// Status of the head.
     pub status: Status,
-    /// Head position in counts of 0.3 degrees, 600 at 0 degrees; at most 1200 on an 881, 13 bits elsewhere.
+    /// Head position in counts of 0.3 degrees, 600 at 0 degrees; at most 1200 on an 881, up to 13 bits on other models.
     pub position: u16,
-    /// Direction of stepping.
+    /// Whether the head steps clockwise.
     pub clockwise: bool,
     /// Range setting, m.
     pub range_m: u8,
@@ -122,28 +122,28 @@ pub struct Return {
     pub echo: Bytes<MAX_ECHO_BYTES>,
 }
 
-/// Reason why bytes are no return, or a value is invalid.
+/// A reason why bytes are no return, or why a value is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReturnError {
-    /// Unknown tag.
+    /// The tag is unknown.
     #[error("return: tag {got:02X?}; allowed are IMX, IGX, IPX, INA, INB, INC")]
     Tag {
         /// The three bytes received.
         got: [u8; 3],
     },
-    /// Too few bytes.
+    /// There are too few bytes.
     #[error("return: {got} bytes; needed are {needed}")]
     Short {
-        /// Bytes present.
+        /// Number of bytes present.
         got: usize,
-        /// Bytes needed.
+        /// Number of bytes needed.
         needed: usize,
     },
     /// Bit 7 of a packed field is set.
     #[error("return: a packed field has bit 7 set in bytes {got:02X?}; allowed is 0x00 to 0x7F")]
     HighBit {
-        /// Bytes 5, 6 and 8 to 11.
+        /// Bytes 5, 6 and 8 to 11 of the return.
         got: [u8; 6],
     },
     /// A field above its maximum.
@@ -151,12 +151,12 @@ pub enum ReturnError {
     TooGreat {
         /// Name of the field.
         field: &'static str,
-        /// The value.
+        /// Value of the field.
         got: u16,
-        /// Maximum.
+        /// Maximum of the field.
         max: u16,
     },
-    /// Wrong terminator; it must be 0xFC.
+    /// The terminator isn't 0xFC.
     #[error("return: ends in {got:#04X}; allowed is 0xFC")]
     Terminator {
         /// Byte received.
@@ -165,9 +165,9 @@ pub enum ReturnError {
 }
 
 impl Header {
-    /// Decodes the header at the front of `bytes`; returns it with the length of the following echo.
+    /// Decodes the header at the front of `bytes`; also returns the length of the following echo.
     ///
-    /// `model` overrides the model of the head id.
+    /// `model` overrides the model that the head id implies.
     /// Errors: too short, unknown tag, bit 7 set in a packed field, or a position or length above its maximum.
     pub fn decode(bytes: &[u8], model: Option<Model>) -> Result<(Self, usize), ReturnError> {
         let short = ReturnError::Short { got: bytes.len(), needed: HEADER_BYTES };
@@ -203,7 +203,7 @@ impl Header {
         }
     }
 
-    /// Profile range in mm at 1500 m/s; `None` if no echo was above the threshold.
+    /// Profile range in mm, computed with 1500 m/s; `None` if no echo was above the threshold.
     pub fn profile_mm(&self, model: Model) -> Option<u32> {
         (self.profile_counts != 0).then(|| u32::from(self.profile_counts) * self.count_mm(model))
     }
@@ -232,7 +232,7 @@ impl Header {
 impl Return {
     /// Encodes the return.
     ///
-    /// Errors: a position, profile range or echo length above its maximum.
+    /// Errors: a position, profile range or echo length is above its maximum.
     pub fn encode(&self) -> Result<Bytes<MAX_RETURN_BYTES>, ReturnError> {
         self.header.check(None)?;
         let echo = self.echo.as_slice();
@@ -267,7 +267,7 @@ fn unpack(low: u8, high: u8) -> u16 {
     (u16::from(high & 0x7F) << 7) | u16::from(low & 0x7F)
 }
 
-/// Packs seven bits per byte, so that bit 7 stays clear.
+/// Packs seven bits into each byte, so that bit 7 stays clear.
 fn pack(value: u16) -> [u8; 2] {
     [(value & 0x7F) as u8, ((value >> 7) & 0x7F) as u8]
 }
@@ -276,10 +276,10 @@ fn at_most(field: &'static str, got: u16, max: u16) -> Result<(), ReturnError> {
     if got > max { Err(ReturnError::TooGreat { field, got, max }) } else { Ok(()) }
 }
 
-/// Framing of returns in the stream from head to host.
+/// Separates returns in the stream from head to host.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Returns {
-    /// Model for a line with a known device, overriding the head id; `None` goes by head id.
+    /// Model of the device on the line, if known. It overrides the model that the head id implies.
     pub model: Option<Model>,
 }
 

@@ -1,5 +1,5 @@
-//! The driver with an emulated head, on a line that loses, corrupts, duplicates and delays messages; without port or
-//! clock.
+//! The driver with an emulated head, on a line that loses, corrupts, duplicates and delays messages. No port and no
+//! clock are used.
 
 use headrace_sensor::device::{Direction, Emulator as _, EmulatorSetup};
 use headrace_sensor::geometry::math::{PI, TAU};
@@ -13,20 +13,20 @@ use crate::settings::tests::settings;
 use crate::stepping::Head;
 
 const BEGUN: MonoNs = MonoNs(2_000_000_000);
-/// An infinite pause.
+/// A pause that never ends.
 const STALLS: DurNs = DurNs(i64::MAX);
 const LATENCY: DurNs = DurNs(9_000_000);
 
-/// Faults of the line.
+/// Faults of the line. Messages are identified by number.
 #[derive(Default)]
 struct Faults {
-    /// Numbers of lost commands, and of lost answers.
+    /// Numbers of commands that are lost; then numbers of answers that are lost.
     lost_commands: Vec<usize>,
     lost_answers: Vec<usize>,
-    /// Numbers of answers with a flipped byte.
+    /// Numbers of answers in which a byte is flipped; then numbers of answers that arrive twice.
     broken_answers: Vec<usize>,
     doubled_answers: Vec<usize>,
-    /// Answers that arrive in two parts, with the pause between them.
+    /// Numbers of answers that arrive in two parts, each with the pause between the parts.
     halved_answers: Vec<(usize, DurNs)>,
 }
 
@@ -40,9 +40,9 @@ struct Rig {
     sent: Vec<MonoNs>,
     outbox: Vec<Vec<u8>>,
     answers: usize,
-    /// True if the last answer is duplicated.
+    /// Whether the last answer has been duplicated.
     doubled: bool,
-    /// Delivered returns at the dive's settings: ping time, position.
+    /// Time and position of the pings whose returns, at the dive's settings, were delivered.
     pings: Vec<(MonoNs, u16)>,
     delivered: Vec<u8>,
 }
@@ -74,7 +74,7 @@ impl Wire for Ends<'_> {
 }
 
 impl Rig {
-    /// A rig with the head at `stands_rad` at the start.
+    /// Creates a rig whose head is at `stands_rad` at the start.
     fn new(text: &str, program: HeadProgram, stands_rad: f64, faults: Faults) -> Self {
         let settings = settings(text).unwrap();
         let now = BEGUN;
@@ -108,7 +108,7 @@ impl Rig {
         }
     }
 
-    /// Delivers a command to the head, and its answer to the line.
+    /// Delivers a command to the head, and puts the head's answer on the line.
     fn carry(&mut self, command: &[u8]) {
         let number = self.sent.len();
         self.sent.push(self.now);
@@ -138,7 +138,7 @@ impl Rig {
                 Some((_, pause)) => {
                     let (first, second) = bytes.split_at(5);
                     self.line.push((at, first.to_vec()));
-                    // A head that stalls within an answer sends no more.
+                    // A head that stalls within an answer sends nothing more.
                     self.line.extend((*pause < STALLS).then(|| (at + *pause, second.to_vec())));
                 }
                 None => self.line.push((at, bytes.clone())),
@@ -172,7 +172,7 @@ impl Rig {
         }
     }
 
-    /// Asserts at most one step between consecutive pings after `from`, or two at the `lost` ones.
+    /// Asserts that consecutive pings after `from` are at most one step apart, or two steps at the `lost` pings.
     fn assert_gapless(&self, from: MonoNs, lost: usize) {
         let step = i32::from(self.driver.settings.step_counts);
         let after: Vec<i32> = self.pings.iter().filter(|p| p.0 >= from).map(|p| i32::from(p.1)).collect();
@@ -183,7 +183,7 @@ impl Rig {
         assert!(wide.len() <= lost && wide.iter().all(|moved| moved.abs() <= 2 * step), "{wide:?}");
     }
 
-    /// Asserts that after `from` each ping has the program's position and time.
+    /// Asserts that each ping after `from` has the program's position and time.
     fn assert_on_time(&self, from: MonoNs) {
         let timetable = &self.driver.timetable;
         let late = DurNs(1_000_000);
@@ -263,7 +263,7 @@ fn fault_leaves_no_gap_and_the_phase_recovers() {
     }
 }
 
-/// With one answer in fifty lost, the head falls behind, catches up, and misses only the pings of the lost answers.
+/// With one answer in fifty lost, the head lags, catches up, and misses only the pings whose answers were lost.
 #[test]
 fn lossy_line_misses_only_the_lost_pings() {
     let lost: Vec<usize> = (1..60).map(|n| 50 * n).collect();

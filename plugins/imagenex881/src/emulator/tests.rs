@@ -11,7 +11,7 @@ use crate::settings::tests::settings;
 /// Radius of the tube, m.
 const RADIUS_M: f64 = 4.0;
 
-/// Result of a rehearsal: send and receive times in ns, and the readings.
+/// Result of a run: send and receive times, ns, and the readings with their times.
 struct Run {
     sent: Vec<u64>,
     received: Vec<u64>,
@@ -27,7 +27,7 @@ fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
     let mut run = Run { sent: Vec::new(), received: Vec::new(), readings: Vec::new() };
     let mut due = Vec::new();
     let last = start + DurNs(settings.ping_period.0 * (pings as i64 - 1));
-    // Calling `begin` twice gives each ping once.
+    // `begin` is called twice, and still gives each ping once.
     emulator.begin(start + DurNs(settings.ping_period.0 / 2), &mut due);
     emulator.begin(last + DurNs(1), &mut due);
     for sounding in due {
@@ -53,7 +53,7 @@ fn turning(start_rad: f64, growing: bool) -> HeadProgram {
     HeadProgram { start_rad, growing, sector: None }
 }
 
-/// Sensor angles of the readings, in whole counts.
+/// Sensor angles of the readings, in counts.
 fn counts(run: &Run) -> Vec<i32> {
     run.readings.iter().map(|(_, sonar)| counts_of_rad(sonar.angle_rad)).collect()
 }
@@ -123,7 +123,7 @@ fn check_sweep(text: &str, step: i32, least: i32, size: i32, start: i32, growing
     let got: Vec<i32> = counts(&run).iter().map(|count| (count - least).rem_euclid(1200)).collect();
     assert_eq!(got[0], (start - least).rem_euclid(1200));
     assert_eq!(got[..period], got[period..2 * period], "{text}");
-    // Each end is pinged once per sweep, at the turning point.
+    // Each end of the sector is pinged once per sweep, at the turning point.
     let ends = |end: i32| got[..period].iter().filter(|count| **count == end.rem_euclid(1200)).count();
     assert_eq!((ends(0), ends(size)), if size == 1200 { (2, 2) } else { (1, 1) });
     assert!(got.iter().all(|count| *count <= size), "{text}: {got:?}");
@@ -150,7 +150,7 @@ fn step_that_does_not_divide_the_sector_is_shortened_at_its_end() {
 #[test]
 fn head_stays_in_its_commanded_sector() {
     let settings = settings("mode = \"fastest\"").unwrap();
-    // 90 degrees about 180: positions 1050 to 150, across the wrap.
+    // The sector is 90 degrees wide about 180 degrees: positions 1050 to 150, across the wrap.
     let command = Command { sector_deg: 90.0, train_deg: 180.0, ..settings.command };
     let mut head = Head::new(1046, true);
     let positions: Vec<u16> = (0..79).map(|_| head.obey(&command).position).collect();

@@ -143,7 +143,7 @@ fn returns_without_echo_give_the_same_readings() {
     let read = |bytes: &[u8]| decode(&mut decoder("mode = \"fast\""), 100, bytes);
     assert_eq!(read(&shorter), read(&packet));
     assert_eq!(read(&packet).len(), 3);
-    // Half a return, foreign bytes, and a return without an echo.
+    // The packets are half a return, foreign bytes, and a return without an echo.
     for kept in [&packet[..400], &packet[1..], &bytes(&good())] {
         assert_eq!(without_echoes(kept, &mut Vec::new()), None);
     }

@@ -43,7 +43,7 @@ fn near<const N: usize>(got: [f64; N], expected: [f64; N], tolerance: f64) {
 }
 
 #[test]
-fn worked_example_1_acceleration_and_its_byte_swapped_twin() {
+fn worked_example_1_decodes_acceleration_as_big_endian() {
     let z = |text| match xsens(text) {
         xsens::Message::Acceleration(raw) => scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)[2],
         other => panic!("{other:?}"),
@@ -53,19 +53,19 @@ fn worked_example_1_acceleration_and_its_byte_swapped_twin() {
 }
 
 #[test]
-fn worked_example_2_turn_rate() {
+fn worked_example_2_decodes_a_turn_rate() {
     let xsens::Message::RateOfTurn(raw) = xsens("032#000000000200") else { panic!() };
     near(scaled(raw, xsens::RATE_QUANTUM_RADPS), [0.0, 0.0, 1.0], 0.0);
 }
 
 #[test]
-fn worked_example_3_euler_angles() {
+fn worked_example_3_decodes_euler_angles() {
     let xsens::Message::EulerAngles(raw) = xsens("022#0640FE60D300") else { panic!() };
     near(scaled(raw, xsens::EULER_QUANTUM_DEG), [12.5, -3.25, -90.0], 0.0);
 }
 
 #[test]
-fn worked_example_4_quaternion() {
+fn worked_example_4_decodes_a_quaternion() {
     let xsens::Message::Quaternion(raw) = xsens("021#76410000000030FB") else { panic!() };
     let [w, x, y, z] = scaled(raw, xsens::QUATERNION_QUANTUM);
     near([w, x, y, z], [0.923_887, 0.0, 0.0, 0.382_671], 1e-6);
@@ -75,7 +75,7 @@ fn worked_example_4_quaternion() {
 }
 
 #[test]
-fn worked_example_5_velocity_change_temperature_pressure_field() {
+fn worked_example_5_decodes_velocity_change_temperature_pressure_and_field() {
     let xsens::Message::DeltaV(delta) = xsens("031#007BFFD303EE0A") else { panic!() };
     assert_eq!(delta.exponent, 10);
     near(delta.mps(), [0.120_12, -0.043_95, 0.982_42], 5e-6);
@@ -88,12 +88,12 @@ fn worked_example_5_velocity_change_temperature_pressure_field() {
 }
 
 #[test]
-fn worked_example_6_sample_time() {
+fn worked_example_6_decodes_a_sample_time() {
     assert_eq!(xsens("005#00002710"), xsens::Message::SampleTime(10_000));
 }
 
 #[test]
-fn worked_example_7_slope() {
+fn worked_example_7_decodes_a_slope() {
     let Message::J1939(j1939::Message::Slope(slope)) = message(J1939, "0CF02980#00C07D00E07B0000") else {
         panic!()
     };
@@ -101,7 +101,7 @@ fn worked_example_7_slope() {
 }
 
 #[test]
-fn worked_example_8_acceleration_and_turn_rate() {
+fn worked_example_8_decodes_acceleration_and_turn_rate() {
     let sent_by_e2 = MessageSet::J1939(j1939::Network { source_address: Some(0xE2) });
     let Message::J1939(j1939::Message::Acceleration(triple)) =
         message(sent_by_e2, "0CF02DE2#007D007DD5800005")
@@ -122,7 +122,7 @@ fn worked_example_8_acceleration_and_turn_rate() {
 }
 
 #[test]
-fn worked_example_9_bosch_and_sbg() {
+fn worked_example_9_decodes_bosch_and_sbg_messages() {
     let Message::Bosch(bosch::Message::Yaw(rate, acceleration)) =
         message(MessageSet::Bosch, "070#D0870000538F0000")
     else {
@@ -173,7 +173,7 @@ fn other_frames_are_ignored_and_wrong_lengths_are_bad() {
 
 #[test]
 fn frame_over_eight_bytes_is_skipped_completely() {
-    // A CAN FD frame of 72 bytes, whose data would parse as further frames.
+    // A CAN FD frame of 72 bytes. Its data would parse as further frames.
     let mut bytes = [0; 72];
     bytes[0] = 0x34;
     bytes[4] = 12;

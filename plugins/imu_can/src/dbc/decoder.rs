@@ -1,4 +1,4 @@
-//! Decodes frames into readings by a mapping.
+//! Decodes frames into readings, according to a mapping.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framed, Framing, Verdict};
 use headrace_sensor::device::Decoder;
@@ -13,10 +13,11 @@ use super::mapping::{Attitude, Axes, Condition, Mapping, Part, Stamp};
 use crate::codec::can_frame;
 use crate::frame::{CanFrame, CanId, FRAME_BYTES, FrameKind};
 
-/// Maximum number of signals in a mapping: 3 of rate, 3 of force, 4 of attitude, 4 states and a time.
+/// Maximum number of frames of a mapping, one for each signal: 3 of rate, 3 of force, 4 of attitude, 4 states and a
+/// time.
 const MOST_FRAMES: usize = 15;
 
-/// Maximum time between the frames of one sample: a unit sends them back to back, and the next sample later.
+/// Maximum time between the frames of one sample. A unit sends them back to back, and the next sample later.
 const SAME_SAMPLE: DurNs = DurNs::from_millis(5);
 
 /// Identifiers and lengths of the mapping's frames.
@@ -25,8 +26,10 @@ pub struct Listened {
     frames: [Option<(CanId, u8)>; MOST_FRAMES],
 }
 
-/// Decodes bytes into the mapping's frames. Other devices' frames, remote and error frames are good frames without a value; a
-/// frame whose length differs from the DBC's is bad.
+/// Decodes bytes into the mapping's frames.
+///
+/// Other devices' frames, remote frames and error frames are good frames without a value. A frame is bad if its length
+/// differs from the DBC's.
 pub type DbcCodec = Framed<Listened, FRAME_BYTES>;
 
 /// Decodes bytes into readings.
@@ -59,7 +62,7 @@ struct State {
 
 stateful!(State { state: all_well, attitude_well, rate_well, force_well, clock, withheld; each: rate, force, quaternion, euler; fixed: axes, latency, stamp; });
 
-/// A vector with its components in one or several frames.
+/// A vector whose components are in one or several frames.
 #[derive(Debug, Clone, Copy)]
 struct Vector<const N: usize> {
     parts: [Part; N],
@@ -69,11 +72,11 @@ struct Vector<const N: usize> {
 stateful!(Vector<3> { slots: came; fixed: parts; });
 stateful!(Vector<4> { slots: came; fixed: parts; });
 
-/// Error: components of different samples were combined.
+/// Error: the components of a vector are from different samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mixed;
 
-/// Validity reported by the unit; assumed valid until reported otherwise.
+/// Validity as reported by the unit. Values count as valid until the unit reports otherwise.
 #[derive(Debug, Clone, Copy)]
 struct Well {
     condition: Option<Condition>,
@@ -83,7 +86,7 @@ struct Well {
 stateful!(Well { state: now; fixed: condition; });
 
 impl Listened {
-    /// Frames of a mapping's signals.
+    /// Finds the frames that contain a mapping's signals.
     pub fn new(mapping: &Mapping) -> Self {
         let mut frames = [None; MOST_FRAMES];
         for place in mapping.places() {
@@ -124,7 +127,7 @@ impl Framing for Listened {
 }
 
 impl DbcDecoder {
-    /// New decoder.
+    /// Creates a decoder.
     pub fn new(mapping: &Mapping) -> Self {
         let (quaternion, euler) = match mapping.attitude {
             Some(Attitude::Quaternion(parts)) => (Some(Vector::new(parts)), None),
@@ -171,7 +174,8 @@ impl Decoder for DbcDecoder {
         self.codec.counts()
     }
 
-    /// Values withheld as marked invalid by the unit or not finite, and vectors with a component missing.
+    /// Number of withheld values and vectors: values that the unit marks invalid or that aren't finite, and vectors
+    /// with a component missing.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -237,7 +241,7 @@ impl<const N: usize> Vector<N> {
 
     /// Stores the components in this frame; returns the vector in SI units once it is complete.
     ///
-    /// Errors: the components are from different samples; the older ones are dropped.
+    /// Errors: the components are from different samples. The older components are dropped.
     fn take(
         &mut self,
         id: CanId,

@@ -1,4 +1,4 @@
-//! Unit side of the bus: the DBC's frames of one sample, at a fixed rate.
+//! Unit side of the bus. The emulator sends the DBC's frames of one sample at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -9,7 +9,7 @@ use super::layout::DATA_BYTES;
 use super::mapping::{Attitude, Condition, Mapping, Part};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// Ideal unit: no noise, bias or added delay, but the quantisation of its signals.
+/// An ideal emulated unit: there is no noise, bias or added delay, but signals are quantised.
 #[derive(Debug, Clone)]
 pub struct DbcEmulator {
     mapping: Mapping,
@@ -29,7 +29,7 @@ struct Frame {
 }
 
 impl DbcEmulator {
-    /// A unit that is switched on, and first samples, at `start`.
+    /// Creates a unit that is switched on, and first samples, at `start`.
     pub fn new(mapping: Mapping, rate_hz: f64, start: MonoNs) -> Self {
         let mut frames: Vec<Frame> = Vec::new();
         for place in mapping.places() {
@@ -48,7 +48,7 @@ impl DbcEmulator {
         Self { mapping, frames, rate_hz, start, begun: 0, told: 0 }
     }
 
-    /// Time from the start to a sample on the unit's clock.
+    /// Time of a sample on the unit's clock, counted from the start.
     fn elapsed(&self, sample: u64) -> DurNs {
         DurNs::from_secs_f64(sample as f64 / self.rate_hz)
     }
@@ -76,7 +76,7 @@ impl DbcEmulator {
         values
     }
 
-    /// Encodes a frame; `None` if one of its values wasn't measured (not finite).
+    /// Encodes a frame; `None` if one of the frame's values is not finite, which means not measured.
     fn frame(&self, frame: Frame, values: &[(Place, f64)], elapsed: DurNs) -> Option<CanFrame> {
         let there = |place: &Place| {
             place.id == frame.id && place.switch.is_none_or(|(_, on)| Some(on) == frame.switch)

@@ -7,21 +7,21 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use super::layout::{Bits, DATA_BYTES, Layout, Order};
 use crate::frame::CanId;
 
-/// Maximum text size: files of IMUs have some kilobytes, of whole vehicles some hundreds. The parser takes up to 75 bytes of
-/// memory for each byte of text (lists of one-letter names).
+/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. The parser
+/// takes up to 75 bytes of memory for each byte of text, for lists of one-letter names.
 const MOST_BYTES: usize = 1 << 20;
 
-/// Maximum number of names listed in an error.
+/// Maximum number of names that an error lists.
 const MOST_NAMES: usize = 40;
 
 const MOST_STANDARD: u32 = 0x7FF;
 const EXTENDED: u64 = 1 << 31;
 
-/// Error in a DBC text, or in a signal requested from it.
+/// An error in a DBC text, or in a signal requested from the text.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DbcError {
-    /// Not a DBC text.
+    /// The text is no DBC text.
     #[error("reading the DBC: {problem}")]
     Parse {
         /// Line, counted from one.
@@ -29,77 +29,77 @@ pub enum DbcError {
         /// Offending text.
         problem: String,
     },
-    /// Text too long.
+    /// The text is too long.
     #[error(
         "reading the DBC: {0} bytes; at most {MOST_BYTES} are allowed: keep only the messages of the unit"
     )]
     Long(usize),
-    /// No such signal.
+    /// There is no such signal.
     #[error("looking for the signal {wanted:?}: the DBC has none of that name; it has {has}")]
     NoSignal {
-        /// Name requested.
+        /// Requested name.
         wanted: String,
-        /// Names available.
+        /// Available names.
         has: String,
     },
-    /// Several messages have a signal of that name.
+    /// Several messages have a signal of the requested name.
     #[error("looking for the signal {wanted:?}: it is in several messages; name one of {among}")]
     Ambiguous {
-        /// Name requested.
+        /// Requested name.
         wanted: String,
         /// Unambiguous names.
         among: String,
     },
     /// The signal extends beyond the end of its frame.
     #[error(
-        "laying out the signal {signal:?}: bits {start}|{size}@{order} reach over the end of its frame of {frame_bytes} \
-         bytes (1 to 64 bits within a classic frame's 8 bytes are allowed)"
+        "laying out the signal {signal:?}: bits {start}|{size}@{order} extend beyond the end of its frame of \
+         {frame_bytes} bytes (1 to 64 bits within a classic frame's 8 bytes are allowed)"
     )]
     Wide {
         /// Name of the signal.
         signal: String,
-        /// Its start bit.
+        /// Start bit of the signal.
         start: u64,
-        /// Its size in bits.
+        /// Size of the signal in bits.
         size: u64,
         /// Byte order: 1 Intel, 0 Motorola.
         order: u8,
-        /// Length of its message.
+        /// Length of the signal's message.
         frame_bytes: u64,
     },
-    /// A float of a length other than 32 or 64 bits.
+    /// A float has a length other than 32 or 64 bits.
     #[error(
         "laying out the signal {signal:?}: a float of {size} bits; allowed are 32 for SIG_VALTYPE_ 1 and 64 for 2"
     )]
     Float {
         /// Name of the signal.
         signal: String,
-        /// Its size in bits.
+        /// Size of the signal in bits.
         size: u64,
     },
-    /// Factor zero, or factor or offset not finite.
+    /// The factor is zero, or factor or offset is not finite.
     #[error(
         "reading the signal {signal:?}: factor {factor}, offset {offset}; both must be finite, and the factor not zero"
     )]
     Scale {
         /// Name of the signal.
         signal: String,
-        /// Its factor, as text.
+        /// Factor of the signal, as text.
         factor: String,
-        /// Its offset, as text.
+        /// Offset of the signal, as text.
         offset: String,
     },
-    /// Invalid identifier.
+    /// The identifier of a message is invalid.
     #[error(
         "reading the message {message:?}: identifier {id}; allowed are up to 2047, or with bit 31 set for an extended one"
     )]
     Id {
         /// Name of the message.
         message: String,
-        /// Its identifier as written.
+        /// Identifier of the message, as written.
         id: u64,
     },
-    /// Nested multiplexing, or not exactly one multiplexer in the message.
+    /// A multiplexed signal whose message has nested multiplexing, or not exactly one multiplexer.
     #[error(
         "reading the signal {signal:?}: unsupported multiplexing; allowed is one multiplexer per message, with single \
          values"
@@ -126,28 +126,29 @@ pub struct Signal {
 pub struct Place {
     /// Identifier of its frames.
     pub id: CanId,
-    /// Length of their data.
+    /// Length of the frames' data.
     pub frame_bytes: u8,
-    /// Position in the data.
+    /// Position of the signal in the data.
     pub layout: Layout,
-    /// Number format.
+    /// Number format of the signal.
     pub bits: Bits,
-    /// Value = bits x factor + offset, in the signal's unit.
+    /// Factor of the conversion value = bits x factor + offset, in the signal's unit.
     pub factor: f64,
-    /// See `factor`.
+    /// Offset of the conversion; see `factor`.
     pub offset: f64,
-    /// Multiplexing: the signal is present only if these bits have this value.
+    /// Condition of multiplexing: the signal is present only if these bits have this value. `None` if always present.
     pub switch: Option<(Layout, u64)>,
 }
 
 impl Place {
-    /// Raw bits of the signal in this frame's data, zero-padded to eight bytes; `None` if the frame doesn't hold it.
+    /// Raw bits of the signal in a frame's data, which is padded with zeros to eight bytes; `None` if the frame doesn't
+    /// have the signal.
     pub fn raw(&self, id: CanId, data: [u8; DATA_BYTES]) -> Option<u64> {
         let there = self.switch.is_none_or(|(switch, value)| switch.extract(data) == value);
         (self.id == id && there).then(|| self.layout.extract(data))
     }
 
-    /// Value of the signal in its own unit.
+    /// Value of the signal in the signal's unit.
     pub fn value(&self, id: CanId, data: [u8; DATA_BYTES]) -> Option<f64> {
         let raw = self.raw(id, data)?;
         Some(self.bits.value(raw, self.layout.bits()) * self.factor + self.offset)
@@ -164,19 +165,19 @@ impl Place {
 #[derive(Debug)]
 pub struct DbcFile {
     dbc: Dbc,
-    /// Identifiers as written, by message: the parser truncates standard ones to 16 bits.
+    /// Identifiers as written, by message. They are kept because the parser truncates standard ones to 16 bits.
     wide_ids: BTreeMap<String, u64>,
 }
 
 impl DbcFile {
     /// Parses a text.
     ///
-    /// Errors: not a DBC text, with its line; text too long.
+    /// Errors: the text is no DBC text, with the offending line; the text is too long.
     pub fn parse(text: &str) -> Result<Self, DbcError> {
         if text.len() > MOST_BYTES {
             return Err(DbcError::Long(text.len()));
         }
-        // Strips a byte-order mark and appends the final newline that the grammar requires.
+        // Strips a byte-order mark, and appends the newline that the grammar requires at the end.
         let text = format!("{}\n", text.trim_start_matches('\u{FEFF}'));
         let dbc = Dbc::try_from(text.as_str()).map_err(|error| named(&text, &error))?;
         Ok(Self { dbc, wide_ids: wide_ids(&text) })
@@ -184,7 +185,7 @@ impl DbcFile {
 
     /// Looks up a signal by its name, or as `Message.Signal`.
     ///
-    /// Errors: no such signal, or several; one that can't be extracted from a classic frame.
+    /// Errors: no signal has this name, or several have it; the signal can't be extracted from a classic frame.
     pub fn signal(&self, wanted: &str) -> Result<Signal, DbcError> {
         let all =
             || self.dbc.messages.iter().flat_map(|message| message.signals.iter().map(move |s| (message, s)));
@@ -304,11 +305,12 @@ fn wide_ids(text: &str) -> BTreeMap<String, u64> {
     text.lines().filter_map(message).collect()
 }
 
-/// Converts a parser error to a readable one with the line and the offending text.
+/// Converts a parser error to a readable error with the line and the offending text.
 fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
     let words = error.to_string();
     let line = if matches!(error, can_dbc::DbcError::Pest(_)) {
-        // ` --> 3:1` is the only source of the line that doesn't require naming the parser's own grammar types.
+        // The line number is parsed from ` --> 3:1`, since other ways of getting it require naming the parser's grammar
+        // types.
         let at = words.split_once("--> ").and_then(|(_, at)| at.split(':').next());
         at.and_then(|line| line.trim().parse().ok()).unwrap_or(1)
     } else {

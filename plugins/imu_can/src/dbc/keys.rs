@@ -8,7 +8,7 @@ use super::mapping::{Attitude, Axes, Condition, Conditions, Kind, Mapping, Part,
 
 /// Reads `axes` and `signals` of a sensor's table with `dbc = file`.
 ///
-/// Errors: an invalid DBC (with its line), an unknown signal, unit or key, or no reading mapped.
+/// Errors: the DBC is invalid (with its line); a signal, unit or key is unknown; no reading is mapped.
 pub fn mapping(file: &NamedFile, own: &Section<'_>, latency: DurNs) -> Result<Mapping, ConfigError> {
     let dbc = DbcFile::parse(&file.text).map_err(|error| in_file(file, own, error))?;
     let axes = own.choice("axes", &[("flu", Axes::Flu), ("frd", Axes::Frd)])?.unwrap_or(Axes::Flu);
@@ -45,7 +45,7 @@ fn in_file(file: &NamedFile, own: &Section<'_>, error: DbcError) -> ConfigError 
     }
 }
 
-/// The table `signals` with the DBC for its names.
+/// The table `signals`, with the DBC in which names are looked up.
 struct Signals<'s, 'a> {
     dbc: &'s DbcFile,
     section: &'s Section<'a>,

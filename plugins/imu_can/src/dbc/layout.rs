@@ -1,8 +1,8 @@
 //! Position of a signal in a frame's data, and conversion of its bits.
 //!
-//! Bits are numbered as in DBC files: bit b is bit b mod 8 (0 the least significant) of byte b / 8. An Intel signal starts
-//! at its least significant bit and goes up; a Motorola signal starts at its most significant bit, goes down to bit 0 of
-//! its byte and continues at bit 7 of the next one.
+//! Bits are numbered as in DBC files: bit b is bit b mod 8 (0 the least significant) of byte b / 8. An Intel signal
+//! starts at its least significant bit and goes up. A Motorola signal starts at its most significant bit, goes down to
+//! bit 0 of the byte, and continues at bit 7 of the next byte.
 //! Source: Vector, DBC file format 1.0; the sawtooth numbering of Motorola signals.
 
 /// Data bytes of a classic frame.
@@ -33,19 +33,21 @@ pub enum Bits {
 /// Position of a signal: 1 to 64 bits within eight bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// Shift of the least significant bit, with the eight bytes read as one number in the signal's byte order.
+    /// Shift of the least significant bit, if the eight bytes are read as one number in the signal's byte order.
     shift: u32,
     bits: u32,
     order: Order,
 }
 
 impl Layout {
-    /// A signal of `size` bits from bit `start`; `None` if it extends beyond `data_bytes`, or has no bits or more than 64.
+    /// Creates the layout of a signal of `size` bits that starts at bit `start`.
+    ///
+    /// `None` if the signal extends beyond `data_bytes`, or has no bits or more than 64.
     pub fn new(start: u64, size: u64, order: Order, data_bytes: usize) -> Option<Self> {
         let all = 8 * u32::try_from(data_bytes.min(DATA_BYTES)).ok()?;
         let start = u32::try_from(start).ok().filter(|start| *start < all)?;
         let bits = u32::try_from(size).ok().filter(|bits| (1..=all).contains(bits))?;
-        // Number of bits before the first, in the signal's bit order.
+        // Number of bits before the signal's first bit, in the signal's bit order.
         let before = match order {
             Order::Intel => start,
             Order::Motorola => start - start % 8 + (7 - start % 8),
@@ -65,7 +67,8 @@ impl Layout {
         self.bits
     }
 
-    /// Raw bits of the signal, from bit 0 up. Allocates: never.
+    /// Raw bits of the signal, from bit 0 up.
+    /// Allocates: never.
     pub fn extract(self, data: [u8; DATA_BYTES]) -> u64 {
         let all = match self.order {
             Order::Intel => u64::from_le_bytes(data),
@@ -74,7 +77,7 @@ impl Layout {
         (all >> self.shift) & self.mask()
     }
 
-    /// Writes the signal's bits into the data; excess bits of `raw` are ignored.
+    /// Writes the signal's bits into the data. Excess bits of `raw` are ignored.
     pub fn insert(self, data: [u8; DATA_BYTES], raw: u64) -> [u8; DATA_BYTES] {
         let put = |all: u64| all & !(self.mask() << self.shift) | (raw & self.mask()) << self.shift;
         match self.order {
@@ -120,7 +123,7 @@ impl Bits {
 }
 
 fn libm_round(value: f64) -> f64 {
-    // Above 2^53 every double is an integer; below, an i64 holds the rounded value.
+    // Above 2^53 every double is an integer. Below 2^53, an i64 can hold the rounded value.
     if value.abs() < 9e15 { headrace_sensor::geometry::math::round_to_i64(value) as f64 } else { value }
 }
 
@@ -212,7 +215,8 @@ mod tests {
         assert_eq!(Bits::Signed.raw(f64::NAN, 8), 0);
     }
 
-    /// Standard reminder on the DBC format: `7|16@0` is bytes 0 and 1, `39|16@0` bytes 4 and 5, most significant first.
+    /// Example of Motorola start bits in the DBC format: `7|16@0` is bytes 0 and 1, and `39|16@0` is bytes 4 and 5,
+    /// most significant first.
     #[test]
     fn motorola_start_bits_name_the_most_significant() {
         let data = [1, 2, 3, 4, 5, 6, 7, 8];

@@ -1,4 +1,4 @@
-//! Mapping of a unit's signals to readings, as used by the loop.
+//! Mapping of a unit's signals to readings, in the form that the loop uses.
 
 use headrace_sensor::geometry::time::DurNs;
 
@@ -41,23 +41,23 @@ pub enum Kind {
     Share,
 }
 
-/// A signal that can't be used as requested.
+/// A reason why a signal can't be used as requested.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MappingError {
-    /// Unit that doesn't fit the quantity.
+    /// The unit of the signal doesn't fit the quantity.
     #[error("using {signal:?} as a {quantity}: its unit is {unit:?}; allowed are {allowed}")]
     Unit {
         /// Name of the signal.
         signal: String,
-        /// Quantity expected.
+        /// Expected quantity.
         quantity: &'static str,
         /// Unit in the DBC.
         unit: String,
         /// Allowed units.
         allowed: String,
     },
-    /// Sample time whose tick can't be used.
+    /// The signal can't be a sample time, since its tick is unsuitable.
     #[error(
         "using {signal:?} as the sample time: a step of {factor} {unit:?}; allowed are whole numbers without an offset, \
          in ns, us, ms or s, a step being 1 ns to 15 minutes and whole nanoseconds"
@@ -70,7 +70,7 @@ pub enum MappingError {
         /// Unit in the DBC.
         unit: String,
     },
-    /// Mask or value with bits beyond the signal.
+    /// The mask or value has bits beyond the signal.
     #[error(
         "using {signal:?} as a state: mask {mask:#X}, value {value:#X}; allowed are an integer signal, a mask within its \
          {bits} bits, and a value within the mask"
@@ -80,7 +80,7 @@ pub enum MappingError {
         signal: String,
         /// Number of bits of the signal.
         bits: u32,
-        /// Bits checked.
+        /// Mask of the checked bits.
         mask: u64,
         /// Required value.
         value: u64,
@@ -99,20 +99,20 @@ pub struct Part {
 /// Attitude representation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Attitude {
-    /// w, x, y, z: sensor to level frame.
+    /// Signals w, x, y, z of a quaternion, from sensor to level frame.
     Quaternion([Part; 4]),
-    /// Roll, pitch, yaw: about fixed x, then y, then z.
+    /// Signals of roll, pitch and yaw: rotations about the fixed axes x, then y, then z.
     Euler([Part; 3]),
 }
 
-/// Condition of validity: readings are withheld unless the signal's bits under `mask` equal `value`.
+/// Condition of validity. Readings are withheld unless the signal's bits under `mask` equal `value`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Condition {
     /// Location of the state.
     pub place: Place,
-    /// Bits checked.
+    /// Mask of the checked bits.
     pub mask: u64,
-    /// Value if valid.
+    /// Value of the checked bits if readings are valid.
     pub value: u64,
 }
 
@@ -128,13 +128,13 @@ pub struct Stamp {
 /// Conditions of validity of the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Conditions {
-    /// For all readings.
+    /// Condition for all readings.
     pub all: Option<Condition>,
-    /// For attitude.
+    /// Condition for attitude.
     pub attitude: Option<Condition>,
-    /// For turn rate.
+    /// Condition for turn rate.
     pub rate: Option<Condition>,
-    /// For specific force.
+    /// Condition for specific force.
     pub force: Option<Condition>,
 }
 
@@ -147,7 +147,7 @@ pub struct Mapping {
     pub rate: Option<[Part; 3]>,
     /// Specific force along x, y, z.
     pub force: Option<[Part; 3]>,
-    /// Orientation.
+    /// Signals of the attitude.
     pub attitude: Option<Attitude>,
     /// Conditions of validity.
     pub conditions: Conditions,
@@ -158,7 +158,7 @@ pub struct Mapping {
 }
 
 impl Axes {
-    /// Converts a vector from the unit's axes to ours, or back.
+    /// Converts a vector from the unit's axes to headrace's, or back.
     pub fn turned(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Flu => [x, y, z],
@@ -166,7 +166,7 @@ impl Axes {
         }
     }
 
-    /// Converts a quaternion w, x, y, z from the unit's frames to ours, or back.
+    /// Converts a quaternion w, x, y, z from the unit's frames to headrace's, or back.
     pub fn rotation_turned(self, [w, x, y, z]: [f64; 4]) -> [f64; 4] {
         let [x, y, z] = self.turned([x, y, z]);
         [w, x, y, z]
@@ -203,7 +203,7 @@ impl Kind {
         }
     }
 
-    /// Allowed units as written in DBC files; case and spaces are ignored.
+    /// Allowed units, as written in DBC files. Case and spaces are ignored.
     fn units(self) -> &'static [(&'static str, Unit)] {
         match self {
             Self::Rate => &[
@@ -236,7 +236,7 @@ impl Kind {
 impl Part {
     /// Uses a signal as a component of this quantity.
     ///
-    /// Errors: a unit that doesn't fit the quantity.
+    /// Errors: the unit doesn't fit the quantity.
     pub fn of(signal: &Signal, kind: Kind) -> Result<Self, MappingError> {
         let written = without_blanks(&signal.unit);
         let unit = kind.units().iter().find(|(name, _)| *name == written).map(|(_, unit)| *unit);
@@ -251,7 +251,7 @@ impl Part {
 }
 
 impl Condition {
-    /// Uses a signal as a state; without `value` all bits of the mask must be set.
+    /// Uses a signal as a state. Without `value`, all bits of the mask must be set.
     ///
     /// Errors: bits beyond the signal, a value outside the mask, a float.
     pub fn of(signal: &Signal, mask: u64, value: Option<u64>) -> Result<Self, MappingError> {
@@ -266,9 +266,10 @@ impl Condition {
 }
 
 impl Stamp {
-    /// Uses a signal as timestamp: a count of ticks, each the signal's factor in its unit.
+    /// Uses a signal as a timestamp. The signal counts ticks, and the length of a tick is the signal's factor in its
+    /// unit.
     ///
-    /// Errors: a unit that is no time, a tick that isn't whole nanoseconds, a float, an offset.
+    /// Errors: the unit is no time, the tick isn't whole nanoseconds, or the signal is a float or has an offset.
     pub fn of(signal: &Signal) -> Result<Self, MappingError> {
         const UNITS_NS: [(&str, f64); 6] =
             [("s", 1e9), ("sec", 1e9), ("ms", 1e6), ("us", 1e3), ("µs", 1e3), ("ns", 1.0)];
@@ -278,7 +279,7 @@ impl Stamp {
         let unit_ns = UNITS_NS.iter().find(|(name, _)| *name == written).map(|(_, ns)| *ns);
         let tick_ns = unit_ns.map_or(0.0, |unit_ns| place.factor * unit_ns);
         let tick = DurNs::from_secs_f64(tick_ns / 1e9);
-        // Factors are decimal fractions: their product with a power of ten is an integer up to rounding.
+        // Factors are decimal fractions, so their product with a power of ten is an integer except for rounding.
         let is_whole = (tick.0 as f64 - tick_ns).abs() <= 1e-9 * tick_ns;
         let counts = matches!(place.bits, Bits::Unsigned | Bits::Signed) && place.offset.abs() == 0.0;
         if !counts || !is_whole || !(1.0..=LONGEST_NS).contains(&tick_ns) {

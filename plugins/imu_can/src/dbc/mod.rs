@@ -1,7 +1,8 @@
 //! Units without a preset, described by a DBC file and a table that maps its signals.
 //!
-//! [`mod@file`] parses the text, [`layout`] extracts signals from frames, [`mapping`] assigns them to readings and [`keys`]
-//! reads that from a vehicle file; [`decoder`] is the loop's side and [`emulator`] the device's.
+//! [`mod@file`] parses the text, [`layout`] extracts signals from frames, [`mapping`] assigns signals to readings and
+//! [`keys`] reads the mapping from a vehicle file. [`decoder`] is the loop's side and [`emulator`] is the device's
+//! side.
 
 pub mod decoder;
 pub mod emulator;

@@ -1,4 +1,4 @@
-//! DBC mappings compared with the presets, worked examples, named errors, and invalid texts.
+//! DBC mappings compared with the presets; worked examples; error texts; invalid DBC texts.
 
 use std::sync::LazyLock;
 
@@ -95,13 +95,13 @@ fn decoded(decoder: &mut dyn Decoder, received: MonoNs, bytes: &[u8]) -> Vec<Dec
     readings
 }
 
-/// Frames of the maker's set with random content, sometimes of a wrong length, and foreign frames.
+/// Packets: frames of the maker's set with random content, some of them with a wrong length, and foreign frames.
 fn frames(ids: &'static [(u16, usize)]) -> impl Strategy<Value = Vec<Vec<u8>>> {
     let own = (0..ids.len(), any::<[u8; 8]>(), 0_u8..16, 0_usize..9).prop_map(|(which, data, odd, other)| {
         let (id, bytes) = ids[which];
         frame(id, &data[..if odd == 0 { other } else { bytes }]).to_vec()
     });
-    // Sparse data: often zero, as in real frames, so that states change and quaternions vanish.
+    // Sparse data has many zero bytes, as in real frames, so that states change and quaternions vanish.
     let sparse = (0..ids.len(), any::<[u8; 8]>(), any::<u8>()).prop_map(|(which, data, keep)| {
         let (id, bytes) = ids[which];
         let mut data = data;
@@ -120,7 +120,7 @@ const XSENS_EULER: [(u16, usize); 5] = [(0x22, 6), (0x11, 4), (0x05, 4), (0x32, 
 const SBG_QUATERNION: [(u16, usize); 4] = [(0x120, 8), (0x121, 6), (0x122, 6), (0x131, 8)];
 const SBG_EULER: [(u16, usize); 4] = [(0x120, 8), (0x121, 6), (0x122, 6), (0x132, 6)];
 
-/// Asserts equal readings (bit for bit), withheld counts and clocks.
+/// Asserts that DBC decoder and preset give equal readings (bit for bit), withheld counts and clocks.
 fn same(mapping: &Mapping, set: MessageSet, packets: &[Vec<u8>], heard: &[(u16, usize)]) -> usize {
     let (mut ours, mut presets) = (DbcDecoder::new(mapping), preset(set));
     let mut readings = 0;
@@ -172,7 +172,7 @@ proptest! {
         same(by_euler, *set, &angles, &[]);
     }
 
-    /// Truncated texts, texts with changed bytes, and arbitrary texts: an error or a result, never a panic.
+    /// Truncated texts, texts with changed bytes, and arbitrary texts give an error or a result, but never a panic.
     #[test]
     fn any_text_is_parsed_without_a_panic(
         cut in 0_usize..4000, changes in proptest::collection::vec((0_usize..4000, any::<char>()), 0..4),
@@ -195,7 +195,7 @@ proptest! {
         }
     }
 
-    /// Out-of-range numbers in the numeric fields.
+    /// Numeric fields have out-of-range numbers.
     #[test]
     fn any_numbers_are_parsed_without_a_panic(
         id: u64, bytes: u64, start: u64, size: u64, order in 0_u8..2, factor in any::<f64>(), mux in 0_u64..5,
@@ -247,7 +247,7 @@ fn clipped_axes_withhold_their_vector() {
     }
 }
 
-/// Worked examples in other makers' layouts: MM5.10 with offsets, in three frames, and J1939's slope of 24 bits.
+/// Worked examples in the layouts of other makers: MM5.10 with offsets and three frames, and J1939's slope of 24 bits.
 const OTHERS: &str = "VERSION \"\"\nBU_: U H\n\
 BO_ 112 TX1: 8 U\n SG_ YawRate : 0|16@1+ (0.005,-163.84) [0|0] \"deg/s\" H\n SG_ AY : 32|16@1+ (0.000127465,-4.1768) [0|0] \"g\" H\n\
 BO_ 128 TX2: 8 U\n SG_ RollRate : 0|16@1+ (0.005,-163.84) [0|0] \"°/s\" H\n SG_ AX : 32|16@1+ (0.000127465,-4.1768) [0|0] \"g\" H\n\
@@ -274,7 +274,8 @@ fn vector_in_several_frames_is_reported_once_complete() {
     let Reading::SpecificForce(force) = got[0].reading else { panic!() };
     assert!([force.x(), force.y(), force.z()].iter().all(|mps2| (mps2 - 0.5 * 9.806_65).abs() < 1e-3));
     assert_eq!(got[0].valid_at, MonoNs(9_000_000));
-    // After a lost frame, remaining parts aren't joined with the next sample. The sample after that is complete.
+    // After a lost frame, the remaining components aren't combined with the next sample. The sample after that is
+    // complete.
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len()), (0, 0));
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len(), send(0x576, 1).len()), (0, 0, 1));
     assert_eq!(decoder.withheld(), 0);
@@ -288,7 +289,7 @@ fn vector_in_several_frames_is_reported_once_complete() {
 }
 
 #[test]
-fn worked_examples_of_other_makers() {
+fn worked_examples_of_other_makers_are_decoded() {
     let dbc = DbcFile::parse(OTHERS).unwrap();
     let value = |name: &str, data: [u8; 8]| {
         let place = dbc.signal(name).unwrap().place;
@@ -302,7 +303,7 @@ fn worked_examples_of_other_makers() {
     assert_eq!(dbc.signal("Pitch").unwrap().place.id, CanId::Extended(0x0CF0_2980));
     near(value("F32", [0xC0, 0x20, 0, 0, 0, 0, 0, 0]), -2.5);
     near(value("F64", (-0.1_f64).to_le_bytes()), -0.1);
-    // Page 1 has one signal, page 0 the other.
+    // A frame of page 0 has the signal Low, a frame of page 1 the signal High.
     let page = |page| [0, 0, 0, 0, page, 0xFF, 0xFE, 0];
     assert_eq!((value("Low", page(0)), value("High", page(0))), (Some(-1.0), None));
     assert_eq!((value("Low", page(1)), value("High", page(1))), (None, Some(-1.0)));
@@ -344,7 +345,7 @@ fn errors_name_the_fault_and_the_allowed_values() {
         error("AX"),
         "looking for the signal \"AX\": it is in several messages; name one of TX2.AX, TX3.AX"
     );
-    assert!(error("Bad").contains("bits 60|8@1 reach over the end of its frame of 8 bytes"));
+    assert!(error("Bad").contains("bits 60|8@1 extend beyond the end of its frame of 8 bytes"));
     assert!(error("InFd").contains("frame of 64 bytes"));
     assert!(error("Nil").contains("factor 0, offset 0"));
     assert!(error("InFar").contains("identifier 70000"));

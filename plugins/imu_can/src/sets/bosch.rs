@@ -1,4 +1,5 @@
-//! Bosch MM5.10 as on the bus of the ABS M5 kit: little-endian, unsigned, one turn rate and one acceleration per frame.
+//! Bosch MM5.10 as used on the bus of the ABS M5 kit: little-endian, unsigned, one turn rate and one acceleration per
+//! frame.
 //!
 //! The unit has no turn rate about its pitch axis.
 //! Source: Bosch Motorsport, ABS M5 Kit manual, p. 40 to 42.
@@ -10,12 +11,12 @@ const YAW: u16 = 0x70;
 const ROLL: u16 = 0x80;
 const VERTICAL: u16 = 0x576;
 
-/// Minimum frame length with both values.
+/// Minimum length of a frame that has both values.
 const NEEDED_BYTES: usize = 6;
 
-/// Step of the turn rates, degrees per second; zero counts are -163.84.
+/// Step of the turn rates, degrees per second. A count of zero is -163.84.
 pub const RATE_QUANTUM_DEGPS: f64 = 0.005;
-/// Step of the accelerations, g; zero counts are -4.1768.
+/// Step of the accelerations, g. A count of zero is -4.1768.
 pub const ACCELERATION_QUANTUM_G: f64 = 0.000_127_465;
 const RATE_OFFSET_DEGPS: f64 = -163.84;
 const ACCELERATION_OFFSET_G: f64 = -4.1768;
@@ -76,7 +77,7 @@ fn raw(value: f64, quantum: f64, offset: f64) -> u16 {
     u16::try_from(raw.clamp(0, i64::from(u16::MAX))).unwrap_or_default()
 }
 
-/// Decodes a frame; `None` if it isn't of this set.
+/// Decodes a frame; `None` if the frame isn't of this set.
 ///
 /// Errors: fewer than six bytes.
 pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
@@ -94,7 +95,7 @@ pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
     }))
 }
 
-/// Encodes a message; undefined bytes are zero.
+/// Encodes a message. Undefined bytes are zero.
 pub fn encode(message: &Message) -> CanFrame {
     let (id, rate, acceleration) = match *message {
         Message::Yaw(rate, acceleration) => (YAW, rate.0, acceleration),

@@ -13,14 +13,14 @@ const ANGULAR_RATE: u32 = 61_482;
 const ACCELERATION: u32 = 61_485;
 /// Default priority of all three groups.
 const PRIORITY: u32 = 3;
-/// Source address of encoded frames if the set accepts any.
+/// Source address of encoded frames if the set accepts any sender.
 const ANY_SENDER: u8 = 0x80;
 
-/// Step of the angles, degrees; zero counts are -250.
+/// Step of the angles, degrees. A count of zero is -250.
 pub const SLOPE_QUANTUM_DEG: f64 = 1.0 / 32_768.0;
-/// Step of the turn rates, degrees per second; zero counts are -250.
+/// Step of the turn rates, degrees per second. A count of zero is -250.
 pub const RATE_QUANTUM_DEGPS: f64 = 1.0 / 128.0;
-/// Step of the accelerations, m/s^2; zero counts are -320.
+/// Step of the accelerations, m/s^2. A count of zero is -320.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 0.01;
 const ANGLE_OFFSET_DEG: f64 = -250.0;
 const ACCELERATION_OFFSET_MPS2: f64 = -320.0;
@@ -33,16 +33,16 @@ pub struct Network {
     pub source_address: Option<u8>,
 }
 
-/// Pitch and roll with range and resolution extended (SSI2).
+/// Pitch and roll with extended range and resolution (SSI2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Slope {
     /// Pitch, 24 bits.
     pub pitch: u32,
     /// Roll, 24 bits.
     pub roll: u32,
-    /// From bit 0, two bits each: pitch compensation, pitch figure of merit, roll compensation, roll figure of merit.
+    /// Two bits each, from bit 0: pitch compensation, pitch figure of merit, roll compensation, roll figure of merit.
     pub figures: u8,
-    /// Age of the values on sending, in half milliseconds.
+    /// Age of the values when the frame was sent, in half milliseconds.
     pub latency: u8,
 }
 
@@ -53,7 +53,7 @@ pub struct Triple {
     pub raw: [u16; 3],
     /// Figures of merit, two bits each from bit 0: 0 good, 1 degraded, 2 error, 3 not available.
     pub figures: u8,
-    /// Age of the values on sending, in half milliseconds.
+    /// Age of the values when the frame was sent, in half milliseconds.
     pub latency: u8,
 }
 
@@ -91,12 +91,12 @@ impl Triple {
         self.values(ACCELERATION_QUANTUM_MPS2, ACCELERATION_OFFSET_MPS2)
     }
 
-    /// True if a figure of merit is "error".
+    /// Whether any figure of merit is "error".
     pub fn has_error(&self) -> bool {
         [0, 2, 4].iter().any(|shift| self.figures >> shift & 0b11 == 0b10)
     }
 
-    /// Age of the values on sending, in milliseconds, if available.
+    /// Age of the values when the frame was sent, in milliseconds, if available.
     pub fn latency_ms(&self) -> Option<f64> {
         is_value(self.latency).then(|| f64::from(self.latency) * LATENCY_QUANTUM_MS)
     }
@@ -108,7 +108,7 @@ impl Triple {
 }
 
 impl Network {
-    /// Decodes a frame; `None` if it isn't of this set, or is from another sender.
+    /// Decodes a frame; `None` if the frame isn't of this set, or is from another sender.
     ///
     /// Errors: a length other than eight.
     pub fn decode(self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {

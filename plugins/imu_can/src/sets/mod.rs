@@ -1,4 +1,4 @@
-//! Makers' message sets. Values keep the wire's integers; their quanta are constants beside them.
+//! Makers' message sets. Values are kept as the wire's integers; constants beside them have their quanta.
 
 pub mod bosch;
 pub mod j1939;
@@ -19,12 +19,12 @@ pub struct MessageError {
     pub needed: usize,
 }
 
-/// Scales integers to physical units.
+/// Converts integers to physical units, given the quantum.
 pub fn scaled<const N: usize>(raw: [i16; N], quantum: f64) -> [f64; N] {
     raw.map(|raw| f64::from(raw) * quantum)
 }
 
-/// Identifier of a data frame; remote and error frames carry no measurement.
+/// Identifier of a data frame; `None` for remote and error frames, which carry no measurement.
 fn data_id(frame: &CanFrame) -> Option<CanId> {
     match frame.kind() {
         FrameKind::Data(id) => Some(id),
@@ -32,7 +32,7 @@ fn data_id(frame: &CanFrame) -> Option<CanId> {
     }
 }
 
-/// The data as an array of exactly `N` bytes.
+/// The frame's data as an array of exactly `N` bytes.
 fn exactly<const N: usize>(id: CanId, data: &[u8]) -> Result<[u8; N], MessageError> {
     data.try_into().map_err(|_| MessageError { id, len: data.len(), needed: N })
 }

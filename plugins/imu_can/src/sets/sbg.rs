@@ -1,7 +1,7 @@
 //! SBG Systems Ellipse and HPINS: little-endian, default identifiers (all outputs are off by default).
 //!
-//! Device axes are x forward, y right, z down, and the earth frame is north, east, down: y and z have the opposite sign of
-//! ours. [`to_ours`] converts vectors and [`rotation_to_ours`] rotations; both are their own inverse.
+//! Device axes are x forward, y right, z down, and the earth frame is north, east, down: y and z have the opposite sign
+//! to headrace's. [`to_ours`] converts vectors and [`rotation_to_ours`] rotations; both are their own inverse.
 //! Source: SBG Systems, sbgECom CAN protocol and sbgCan.dbc; bits of the status in its firmware reference.
 
 use super::{MessageError, data_id, exactly, words};
@@ -18,11 +18,12 @@ pub const EULER_QUANTUM_RAD: f64 = 1e-4;
 /// Temperature, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1e-2;
 
-/// Status bits of valid specific force: the unit responds; accelerometers passed their tests and are within range.
+/// Status bits of valid specific force: the unit responds, and the accelerometers passed their tests and are within
+/// range.
 const FORCE_WELL: u16 = 0x11D;
-/// Status bits of valid turn rate: the same for the gyros.
+/// Status bits of valid turn rate: the unit responds, and the gyros passed their tests and are within range.
 const RATE_WELL: u16 = 0x2E1;
-/// Status with all known bits set to valid.
+/// A status with all known bits set to valid.
 pub const ALL_WELL: ImuStatus = ImuStatus(0x3FF);
 
 /// Status bits of the inertial unit.
@@ -30,12 +31,12 @@ pub const ALL_WELL: ImuStatus = ImuStatus(0x3FF);
 pub struct ImuStatus(pub u16);
 
 impl ImuStatus {
-    /// True if specific force is valid.
+    /// Whether specific force is valid.
     pub fn force_is_well(self) -> bool {
         self.0 & FORCE_WELL == FORCE_WELL
     }
 
-    /// True if turn rate is valid.
+    /// Whether turn rate is valid.
     pub fn rate_is_well(self) -> bool {
         self.0 & RATE_WELL == RATE_WELL
     }
@@ -59,7 +60,7 @@ pub enum Message {
     Rate([i16; 3]),
     /// Header of a filter solution: time since power-on, microseconds.
     EkfTime(u32),
-    /// Sensor to north, east, down; w x y z.
+    /// Rotation from the sensor to north, east, down; w x y z.
     Quaternion([i16; 4]),
     /// Roll, pitch, yaw.
     Euler([i16; 3]),
@@ -67,19 +68,19 @@ pub enum Message {
     Accuracy([u16; 3]),
 }
 
-/// Converts a vector from device axes to ours, or back.
+/// Converts a vector from device axes to headrace's, or back.
 pub fn to_ours([x, y, z]: [f64; 3]) -> [f64; 3] {
     [x, -y, -z]
 }
 
-/// Converts a quaternion w x y z from the device's frames to ours, or back.
+/// Converts a quaternion w x y z from the device's frames to headrace's, or back.
 pub fn rotation_to_ours([w, x, y, z]: [f64; 4]) -> [f64; 4] {
     [w, x, -y, -z]
 }
 
-/// Decodes a frame; `None` if it isn't of this set.
+/// Decodes a frame; `None` if the frame isn't of this set.
 ///
-/// Errors: a wrong length of the message.
+/// Errors: the length is wrong for the message.
 pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
     let Some(id @ CanId::Standard(code)) = data_id(frame) else { return Ok(None) };
     let data = frame.data();

@@ -1,7 +1,7 @@
 //! Xsens (Movella) MTi-600, Sirius and Avior: big-endian, one quantity per frame.
 //!
-//! Each output's identifier is configurable in the device; the defaults are 11-bit codes, and a 29-bit base with the same
-//! code in its lowest byte is in use as well.
+//! Each output's identifier is configurable in the device. The defaults are 11-bit codes. Some devices use 29-bit
+//! identifiers: a base, with the same code in the lowest byte.
 //! Source: Xsens MT CAN protocol (MT1604P); byte order as in all known readers.
 
 use super::{MessageError, data_id, exactly, words};
@@ -25,7 +25,7 @@ pub const PRESSURE_QUANTUM_PA: f64 = 1.0 / 32_768.0;
 /// Identifiers used by the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ids {
-    /// Base of 29-bit identifiers whose lowest byte is the code; `None` for the default 11-bit codes.
+    /// Base of 29-bit identifiers, whose lowest byte is the code; `None` for the default 11-bit codes.
     pub base: Option<u32>,
 }
 
@@ -34,7 +34,7 @@ pub struct Ids {
 pub struct DeltaV {
     /// x, y, z in 2^-`exponent` m/s.
     pub mantissas: [i16; 3],
-    /// See `mantissas`.
+    /// Exponent of the unit of `mantissas`.
     pub exponent: u8,
 }
 
@@ -43,7 +43,7 @@ pub struct DeltaV {
 pub struct Utc {
     /// Year minus 2000, month, day, hour, minute, second.
     pub year_to_second: [u8; 6],
-    /// Tenths of milliseconds.
+    /// Tenths of milliseconds within the second.
     pub tenths_ms: u16,
 }
 
@@ -54,7 +54,7 @@ pub struct StatusWord(pub u32);
 /// One message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
-    /// 1 = the device dropped messages.
+    /// Error code; 1 means that the device dropped messages.
     Error(u8),
     /// Sample timestamp, in ticks of configurable length (100 us by most sources).
     SampleTime(u32),
@@ -64,7 +64,7 @@ pub enum Message {
     Utc(Utc),
     /// Status bits.
     StatusWord(StatusWord),
-    /// Sensor to local earth frame (z up); w x y z.
+    /// Rotation from the sensor to the local earth frame (z up); w x y z.
     Quaternion([i16; 4]),
     /// Roll, pitch, yaw.
     EulerAngles([i16; 3]),
@@ -84,9 +84,9 @@ pub enum Message {
     Temperature(i16),
     /// Air pressure inside the housing.
     BaroPressure(u32),
-    /// Specific force at high rate. Some sources swap this code with the next.
+    /// Specific force at high rate. Some sources swap this code with the code of [`Message::RateOfTurnHr`].
     AccelerationHr([i16; 3]),
-    /// Turn rate at high rate. See [`Message::AccelerationHr`].
+    /// Turn rate at high rate; see [`Message::AccelerationHr`] about its code.
     RateOfTurnHr([i16; 3]),
     /// Latitude in 2^-24 and longitude in 2^-23 degrees.
     LatLon([i32; 2]),
@@ -97,17 +97,17 @@ pub enum Message {
 }
 
 impl StatusWord {
-    /// True if the orientation is valid.
+    /// Whether the orientation is valid.
     pub fn orientation_valid(self) -> bool {
         self.0 & 0b10 != 0
     }
 
-    /// True if an accelerometer is out of range.
+    /// Whether an accelerometer is out of range.
     pub fn acceleration_clipped(self) -> bool {
         self.0 & 0x700 != 0
     }
 
-    /// True if a gyro is out of range.
+    /// Whether a gyro is out of range.
     pub fn rate_clipped(self) -> bool {
         self.0 & 0x3800 != 0
     }
@@ -137,9 +137,9 @@ impl Ids {
         }
     }
 
-    /// Decodes a frame; `None` if it isn't of this set.
+    /// Decodes a frame; `None` if the frame isn't of this set.
     ///
-    /// Errors: a wrong length of the message.
+    /// Errors: the length is wrong for the message.
     pub fn decode(self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {
         let Some(id) = data_id(frame) else { return Ok(None) };
         let data = frame.data();

@@ -12,10 +12,10 @@ pub(super) trait Field: Sized {
     /// Length in bytes.
     const LEN: usize;
 
-    /// Reads it off the front of `from`; `None` if bytes are missing.
+    /// Reads the fields off the front of `from`; `None` if bytes are missing.
     fn read(from: &mut &[u8]) -> Option<Self>;
 
-    /// Appends it.
+    /// Appends the fields to the payload.
     fn write(&self, to: &mut Payload) -> Result<(), TooLong>;
 }
 
@@ -39,7 +39,7 @@ macro_rules! integers {
 
 integers!(u8, u16, u32);
 
-/// Any value but 0 is true.
+/// Any value except 0 is true.
 impl Field for bool {
     const LEN: usize = 1;
 

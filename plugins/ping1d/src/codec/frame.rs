@@ -1,13 +1,15 @@
-//! Frames: `BR`, payload length, message id, source, destination, payload, sum of all that as 16 bits.
+//! Frames: `BR`, payload length, message id, source, destination, payload, and a checksum. The checksum is the sum of
+//! all preceding bytes, as 16 bits.
 //!
 //! Source: Ping protocol, packet format. All numbers are little-endian.
 
 use headrace_sensor::codec::{Bytes, TooLong, Verdict};
 
-/// Maximum frame length accepted. The protocol allows 65 545 bytes, but no echosounder comes near this.
+/// Maximum accepted frame length. The protocol allows 65,545 bytes, but frames of echosounders are far shorter than
+/// this maximum.
 pub const MAX_FRAME_BYTES: usize = 4096;
 
-/// Maximum payload length accepted.
+/// Maximum accepted payload length.
 pub const MAX_PAYLOAD_BYTES: usize = MAX_FRAME_BYTES - HEADER_BYTES - CHECKSUM_BYTES;
 
 const HEADER_BYTES: usize = 8;
@@ -28,7 +30,7 @@ pub struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// Parses the frame at the front of `bytes`; `None` unless complete with a correct checksum.
+    /// Parses the frame at the front of `bytes`; `None` unless the frame is complete and its checksum is correct.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         let (header, rest) = bytes.split_first_chunk::<HEADER_BYTES>()?;
         let [b, r, n0, n1, i0, i1, source, destination] = *header;
@@ -40,7 +42,7 @@ impl<'a> Frame<'a> {
 
     /// Encodes the frame.
     ///
-    /// Errors: a payload longer than [`MAX_PAYLOAD_BYTES`].
+    /// Errors: the payload is longer than [`MAX_PAYLOAD_BYTES`].
     pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, TooLong> {
         let mut frame = Bytes::default();
         begin(&mut frame, self.id, self.source, self.destination)?;
@@ -60,11 +62,11 @@ pub(super) fn begin(
     let [i0, i1] = id.to_le_bytes();
     let [b, r] = START;
     frame.clear();
-    // The length is set at the end.
+    // A placeholder for the length, which is set at the end.
     frame.extend(&[b, r, 0, 0, i0, i1, source, destination])
 }
 
-/// Ends a frame whose payload is complete.
+/// Ends a frame whose payload is complete: sets the length and appends the checksum.
 pub(super) fn end(frame: &mut Bytes<MAX_FRAME_BYTES>) -> Result<(), TooLong> {
     let len = frame.as_slice().len().saturating_sub(HEADER_BYTES);
     let length = u16::try_from(len).map_err(|_| TooLong { len, max: MAX_PAYLOAD_BYTES })?;
@@ -75,18 +77,18 @@ pub(super) fn end(frame: &mut Bytes<MAX_FRAME_BYTES>) -> Result<(), TooLong> {
     frame.extend(&sum.to_le_bytes())
 }
 
-/// Judges whether `front` is, or may become, a frame; checks the checksum but not the payload.
+/// Judges whether `front` is a frame or may become one. The checksum is checked, but not the payload.
 pub(super) fn judge(front: &[u8]) -> Verdict {
     if front.iter().zip(START).any(|(byte, wanted)| *byte != wanted) {
         return Verdict::NotAStart;
     }
     let Some((_, payload, _)) = announced(front) else { return Verdict::Need(HEADER_BYTES) };
     let whole = HEADER_BYTES + payload + CHECKSUM_BYTES;
-    // The codec rejects frames longer than its buffer.
+    // The codec itself rejects frames longer than its buffer.
     Verdict::on(front, whole, |frame| Frame::parse(frame).is_some())
 }
 
-/// Message id and payload length from the header, and the part of the payload present.
+/// Message id and payload length from the header, and the part of the payload that is present.
 pub(super) fn announced(front: &[u8]) -> Option<(u16, usize, &[u8])> {
     let (&[_, _, n0, n1, i0, i1, _, _], rest) = front.split_first_chunk::<HEADER_BYTES>()?;
     let len = usize::from(u16::from_le_bytes([n0, n1]));

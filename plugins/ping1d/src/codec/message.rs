@@ -14,13 +14,13 @@ record! {
         device_type: u8,
         /// Revision of the hardware.
         revision: u8,
-        /// Firmware, major.
+        /// Firmware version, major.
         firmware_major: u8,
-        /// Firmware, minor.
+        /// Firmware version, minor.
         firmware_minor: u8,
-        /// Firmware, patch.
+        /// Firmware version, patch.
         firmware_patch: u8,
-        /// Zero.
+        /// Reserved; zero.
         reserved: u8,
     }
 }
@@ -28,13 +28,13 @@ record! {
 record! {
     /// Protocol version of a device.
     ProtocolVersion {
-        /// Major.
+        /// Major version.
         major: u8,
-        /// Minor.
+        /// Minor version.
         minor: u8,
-        /// Patch.
+        /// Patch version.
         patch: u8,
-        /// Zero.
+        /// Reserved; zero.
         reserved: u8,
     }
 }
@@ -44,7 +44,7 @@ record! {
     ScanRange {
         /// Minimum distance, mm.
         start_mm: u32,
-        /// Length from there, mm; at least 1000.
+        /// Length of the range from the minimum distance, mm; at least 1000.
         length_mm: u32,
     }
 }
@@ -52,9 +52,9 @@ record! {
 record! {
     /// Legacy status summary.
     GeneralInfo {
-        /// Firmware, major.
+        /// Firmware version, major.
         firmware_major: u16,
-        /// Firmware, minor.
+        /// Firmware version, minor.
         firmware_minor: u16,
         /// Supply voltage, mV.
         voltage_mv: u16,
@@ -62,7 +62,7 @@ record! {
         ping_interval_ms: u16,
         /// Gain index, 0 to 6.
         gain: u8,
-        /// True if the device chooses range and gain.
+        /// Whether the device chooses range and gain.
         auto: bool,
     }
 }
@@ -78,7 +78,7 @@ record! {
 }
 
 record! {
-    /// Distance to the target, with its ping's parameters.
+    /// Distance to the target, with the parameters of the ping.
     Distance {
         /// Distance at the device's speed of sound setting, mm.
         distance_mm: u32,
@@ -86,7 +86,7 @@ record! {
         confidence_percent: u16,
         /// Pulse length, us.
         pulse_us: u16,
-        /// Pings since the device was switched on.
+        /// Number of pings since the device was switched on.
         ping_number: u32,
         /// Listening range.
         scan: ScanRange,
@@ -95,16 +95,16 @@ record! {
     }
 }
 
-/// A ping with its echo.
+/// A ping with its echo strengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Profile {
-    /// The ping.
+    /// Distance and parameters of the ping.
     pub distance: Distance,
-    /// Echo strengths, evenly spaced over the scan; at most as many as fit a payload.
+    /// Echo strengths, evenly spaced over the scan. There are at most as many as fit a payload.
     pub strengths: Bytes<MAX_STRENGTHS>,
 }
 
-/// Length of a profile before its strengths: distance fields and count.
+/// Length of a profile before its strengths: the distance fields and the count.
 const PROFILE_HEADER: usize = Distance::LEN + u16::LEN;
 
 /// Maximum number of strengths in a payload.
@@ -115,7 +115,7 @@ pub const MAX_STRENGTHS: usize = MAX_PAYLOAD_BYTES - PROFILE_HEADER;
 pub struct Text(pub Bytes<MAX_PAYLOAD_BYTES>);
 
 impl Text {
-    /// Readable part: up to the first zero or the first byte that isn't UTF-8.
+    /// Readable part of the text: up to the first zero, or the first byte that isn't UTF-8.
     pub fn as_str(&self) -> &str {
         let bytes = self.0.as_slice().split(|byte| *byte == 0).next().unwrap_or_default();
         bytes.utf8_chunks().next().map_or("", |chunk| chunk.valid())
@@ -128,11 +128,11 @@ impl core::fmt::Debug for Text {
     }
 }
 
-/// Reason why a message can't be sent, or a frame can't be decoded.
+/// A reason why a message can't be sent, or a frame can't be decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MessageError {
-    /// Payload length that doesn't fit its message.
+    /// The payload length doesn't fit the message.
     #[error("ping message {id}: a payload of {len} bytes is wrong for this message")]
     Length {
         /// Message id.
@@ -140,26 +140,28 @@ pub enum MessageError {
         /// Length of the payload.
         len: usize,
     },
-    /// Count of strengths that doesn't match the payload length.
+    /// The count of strengths doesn't match the payload length.
     #[error("ping profile: {announced} strengths are announced, but {present} are present")]
     Count {
-        /// Count according to the profile.
+        /// Count as stated in the profile.
         announced: u16,
-        /// Count according to the payload length.
+        /// Count as computed from the payload length.
         present: usize,
     },
-    /// An id that may not be sent as an unknown message.
-    #[error("ping message {id}: can't be sent as unknown: the id is known, or starts the bootloader")]
+    /// The id may not be sent as an unknown message.
+    #[error(
+        "ping message {id}: cannot be sent as an unknown message: the id is known, or starts the bootloader"
+    )]
     NotSendable {
         /// Message id.
         id: u16,
     },
-    /// Payload above the maximum length.
+    /// The payload is longer than the maximum.
     #[error("ping message: {0}")]
     TooLong(#[from] TooLong),
 }
 
-/// Defines the enum, the ids, and encoding and decoding of fixed-length messages, from one table.
+/// Defines the enum, the ids, and the encoding and decoding of fixed-length messages from one table.
 macro_rules! messages {
     ($($(#[$meta:meta])* $name:ident($type:ty) = $constant:ident $id:literal,)*) => {
         /// Message ids.
@@ -171,7 +173,7 @@ macro_rules! messages {
             pub const ASCII_TEXT: u16 = 3;
             /// Switches the device to its bootloader. Never sent.
             pub const GOTO_BOOTLOADER: u16 = 1100;
-            /// A ping with its echo.
+            /// A ping with its echo strengths.
             pub const PROFILE: u16 = 1300;
         }
 
@@ -188,9 +190,9 @@ macro_rules! messages {
             },
             /// Human-readable text.
             AsciiText(Text),
-            /// A ping with its echo.
+            /// A ping with its echo strengths.
             Profile(Profile),
-            /// A message of unknown id, kept as received.
+            /// A message with an unknown id, kept as received.
             Other {
                 /// Message id.
                 id: u16,
@@ -279,7 +281,7 @@ messages! {
     SpeedOfSound(u32) = SPEED_OF_SOUND 1203,
     /// Listening range.
     Range(ScanRange) = RANGE 1204,
-    /// True if the device chooses range and gain.
+    /// Whether the device chooses range and gain.
     ModeAuto(bool) = MODE_AUTO 1205,
     /// Minimum time between pings, ms.
     PingInterval(u16) = PING_INTERVAL 1206,
@@ -291,24 +293,24 @@ messages! {
     GeneralInfo(GeneralInfo) = GENERAL_INFO 1210,
     /// Distance and confidence.
     DistanceSimple(DistanceSimple) = DISTANCE_SIMPLE 1211,
-    /// Distance with its ping's parameters.
+    /// Distance with the parameters of the ping.
     Distance(Distance) = DISTANCE 1212,
     /// Processor temperature, 0.01 degrees Celsius.
     ProcessorTemperature(u16) = PROCESSOR_TEMPERATURE 1213,
     /// Board temperature, 0.01 degrees Celsius.
     PcbTemperature(u16) = PCB_TEMPERATURE 1214,
-    /// True if pinging is enabled.
+    /// Whether pinging is enabled.
     PingEnabled(bool) = PING_ENABLED 1215,
     /// Starts continuous output of the message with this id.
     ContinuousStart(u16) = CONTINUOUS_START 1400,
-    /// Stops it.
+    /// Stops continuous output of the message with this id.
     ContinuousStop(u16) = CONTINUOUS_STOP 1401,
 }
 
 impl Message {
     /// Decodes a frame. Unknown ids are kept as [`Message::Other`].
     ///
-    /// Errors: a payload that doesn't fit its message.
+    /// Errors: the payload doesn't fit the message.
     pub fn decode(frame: &Frame<'_>) -> Result<Self, MessageError> {
         let Frame { id, payload, .. } = *frame;
         let length = MessageError::Length { id, len: payload.len() };
@@ -328,10 +330,11 @@ impl Message {
         }
     }
 
-    /// Encodes the message as a frame from one device id to another, replacing the content of `frame`.
+    /// Encodes the message as a frame from one device id to another. The frame replaces the content of `frame`.
     ///
-    /// The frame is passed in because frames are as large as the longest message. Errors: a payload beyond
-    /// [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
+    /// The caller passes `frame`, since frames are as large as the longest message.
+    ///
+    /// Errors: the payload is longer than [`MAX_PAYLOAD_BYTES`], or the id may not be sent as [`Message::Other`].
     pub fn encode_to(
         &self,
         frame: &mut Bytes<MAX_FRAME_BYTES>,
@@ -345,7 +348,7 @@ impl Message {
 }
 
 impl Distance {
-    /// The ping of a distance or profile frame.
+    /// Reads distance and ping parameters of a distance or profile frame; `None` for other frames.
     pub fn of(frame: &Frame<'_>) -> Option<Self> {
         let mut payload = frame.payload;
         matches!(frame.id, id::DISTANCE | id::PROFILE).then(|| Self::read(&mut payload)).flatten()
@@ -353,7 +356,7 @@ impl Distance {
 }
 
 impl DistanceSimple {
-    /// The distance of a simple distance frame.
+    /// Reads the distance of a simple distance frame; `None` for other frames.
     pub fn of(frame: &Frame<'_>) -> Option<Self> {
         let mut payload = frame.payload;
         (frame.id == id::DISTANCE_SIMPLE).then(|| Self::read(&mut payload)).flatten()
@@ -385,7 +388,7 @@ fn is_known(id: u16) -> bool {
     matches!(id, id::NACK | id::ASCII_TEXT | id::PROFILE) || fixed_len(id).is_some()
 }
 
-/// True if a message of that id may have this payload length, given the payload bytes present so far.
+/// Whether a message of this id may have this payload length, given the payload bytes present so far.
 pub(super) fn may_be(id: u16, len: usize, there: &[u8]) -> bool {
     match id {
         id::NACK => len >= u16::LEN,

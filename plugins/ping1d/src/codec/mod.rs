@@ -17,16 +17,16 @@ pub use message::{
 pub struct Addressed {
     /// Device id of the sender; 0 is the host.
     pub source: u8,
-    /// Device id of the receiver; 0 is the host, 255 everyone.
+    /// Device id of the receiver; 0 is the host, 255 all devices.
     pub destination: u8,
-    /// Message.
+    /// The message.
     pub message: Message,
 }
 
 impl Addressed {
     /// Encodes the message as a frame.
     ///
-    /// Errors: a payload beyond [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
+    /// Errors: the payload is longer than [`MAX_PAYLOAD_BYTES`], or the id may not be sent as [`Message::Other`].
     pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, MessageError> {
         let mut frame = Bytes::default();
         self.message.encode_to(&mut frame, self.source, self.destination)?;
@@ -34,10 +34,10 @@ impl Addressed {
     }
 }
 
-/// Framing of messages in a byte stream, in either direction.
+/// Separates messages in a byte stream, in either direction.
 ///
-/// A frame of a known id with a length that doesn't fit its message is rejected as early as possible, so that a false length
-/// swallows no further frames. Only texts and unknown messages have no length to check.
+/// A frame with a known id is rejected as soon as its length doesn't fit its message. A false length therefore hides no
+/// further frames. Only texts and unknown messages have no length to check.
 /// Source: Ping protocol, packet format.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Frames;

@@ -22,7 +22,7 @@ fn ping() -> Distance {
     }
 }
 
-/// Worked frames of the protocol description: bytes, sender, message.
+/// Worked examples of the protocol description: bytes of the frame, sender, message.
 fn examples() -> Vec<(Vec<u8>, u8, Message)> {
     let near = Distance {
         distance_mm: 1500,
@@ -86,7 +86,7 @@ fn frame(id: u16, payload: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn worked_frames_both_ways() {
+fn worked_frames_encode_and_decode() {
     for (bytes, source, message) in examples() {
         let value = Addressed { source, destination: 0, message };
         assert_eq!(decode(&bytes).0, [value]);
@@ -160,7 +160,7 @@ fn unknown_message_is_kept_and_known_ids_are_refused_as_unknown() {
 }
 
 #[test]
-fn stray_b_before_a_frame_loses_nothing() {
+fn stray_start_byte_before_a_frame_loses_no_frame() {
     for (bytes, _, message) in examples() {
         let (got, counts) = decode(&[b"B", &bytes[..]].concat());
         assert_eq!(got.iter().map(|value| value.message).collect::<Vec<_>>(), [message]);
@@ -169,7 +169,7 @@ fn stray_b_before_a_frame_loses_nothing() {
 }
 
 #[test]
-fn false_length_swallows_nothing() {
+fn false_length_loses_only_its_own_frame() {
     let good = examples().swap_remove(4).0;
     let mut profile = examples().swap_remove(6).0;
     profile[2] = 0xFF;

@@ -1,4 +1,4 @@
-//! The driver with an emulated device on a lossy line; without port or clock.
+//! The driver with an emulated device on a lossy line. No port and no clock are used.
 
 use headrace_sensor::device::{Emulator as _, EmulatorSetup};
 use headrace_sensor::geometry::site::Site;
@@ -18,9 +18,9 @@ struct Rig {
     line: Vec<(MonoNs, Vec<u8>)>,
     sent: Vec<Message>,
     heard: Vec<(MonoNs, Message)>,
-    /// Every n-th message from the host is lost; 0 loses none.
+    /// Every n-th message from the host is lost; 0 means that none is lost.
     loses: usize,
-    /// One additional lost message from the host, by number.
+    /// Number of one more message from the host that is lost.
     loses_only: Option<usize>,
 }
 
@@ -72,7 +72,7 @@ impl Rig {
         }
     }
 
-    /// Triggers a ping, with the wall at 4 m.
+    /// Executes the pings that are due, with the wall at 4 m.
     fn ping(&mut self) {
         let mut due = Vec::new();
         self.device.begin(self.now + DurNs(1), &mut due);
@@ -135,7 +135,7 @@ fn continuous_device_is_started_once_and_not_polled() {
 }
 
 #[test]
-fn lossy_line_costs_only_its_lost_messages_and_a_timeout() {
+fn lossy_line_still_gives_180_distances_in_20_s() {
     let mut rig = Rig::new("interval_ms = 50", 7);
     rig.run(20.0);
     assert!(rig.distances() > 180, "{}", rig.distances());
@@ -164,7 +164,7 @@ fn silent_device_still_gets_settings_and_distance_requests() {
 }
 
 #[test]
-fn foreign_speed_of_sound_is_set_back() {
+fn speed_of_sound_set_by_another_client_is_restored() {
     let mut rig = Rig::new("", 0);
     rig.run(5.0);
     let other = Addressed { source: 0, destination: 1, message: Message::SetSpeedOfSound(1_480_000) };

@@ -6,7 +6,9 @@ use super::*;
 use crate::plugin::PingDecoder;
 use crate::settings::tests::settings;
 
-/// Send times, and readings with their times, in ms; `range_m` gives the wall's distance by seconds.
+/// Runs the emulator; returns the send times, and the readings with their times, ms.
+///
+/// `range_m` returns the distance of the wall at a time in seconds.
 fn run(
     text: &str,
     range_m: impl Fn(f64) -> Option<f64>,

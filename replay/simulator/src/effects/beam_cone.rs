@@ -1,4 +1,4 @@
-//! A beam is a cone, and its range is formed from all the wall within it.
+//! Treats a beam as a cone. The range is formed from all the wall within the cone.
 
 mod bins;
 
@@ -25,11 +25,11 @@ use bins::Bins;
 ///
 /// Keys:
 /// - `rays` per beam, from 1 to 1024 (16; 64 if `form` is bilinear).
-/// - `width_deg`, the cone's full width, from 0.1 to 60, or `frequency_khz`, the head's frequency from which it
-///   follows, from 600 to 1000 (a head's own width; 30 for an echosounder).
+/// - `width_deg`, the cone's full width, from 0.1 to 60; or `frequency_khz`, the frequency that determines the width of
+///   a head's beam, from 600 to 1000. The default is a head's own width, and 30 degrees for an echosounder.
 /// - `form`: first, mean or bilinear (first).
-/// - `bin_m`, the range bin width for bilinear, from 0.001 to 1 m (a 500th of a head's range setting in this water;
-///   0.15 for an echosounder).
+/// - `bin_m`, the width of a range bin for bilinear, from 0.001 to 1 m. The default is a 500th of a head's range
+///   setting in this water, and 0.15 m for an echosounder.
 ///
 /// Source: Jorge et al. 2021, §6 and §9.2; for an echosounder the field of view of a Ping1D in BlueOS, 0.52 rad, and
 /// the 200 points of its profile over 30 m.
@@ -38,13 +38,14 @@ pub(super) struct BeamConeKind;
 /// Angle between successive rays of a sunflower pattern, radians: the golden angle. Source: Vogel, "A better way to
 /// construct the sunflower head", Mathematical Biosciences 44, 1979.
 const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
-/// Strength at the beam's edge relative to its axis. The width is measured between half-power points.
+/// Strength at the beam's edge relative to the axis. The edge is at half power, since beam widths are measured between
+/// half-power points.
 const EDGE: f64 = 0.5;
 /// Width of an echosounder's beam, degrees.
 const ECHOSOUNDER_DEG: f64 = 30.0;
-/// Bin of an echosounder's profile, m.
+/// Width of a range bin of an echosounder's profile, m.
 const ECHOSOUNDER_BIN_M: f64 = 0.15;
-/// Points of a head's echo over its range setting. Source: Jorge et al. 2021, §9.2.
+/// Number of points of a head's echo over its range setting. Source: Jorge et al. 2021, §9.2.
 const HEAD_POINTS: f64 = 500.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +61,7 @@ const FORMS: [(&str, Form); 3] = [("first", Form::First), ("mean", Form::Mean), 
 struct Parameters {
     rays: usize,
     width_deg: Option<f64>,
-    /// For heads only.
+    /// Applies to heads only.
     frequency_khz: Option<f64>,
     form: Form,
     bin_m: Option<f64>,
@@ -74,9 +75,9 @@ pub struct Cone {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConeRay {
-    /// Components along the beam's axis, along the tunnel, and perpendicular to both.
+    /// Components of the direction along the beam's axis, along the tunnel, and perpendicular to both.
     parts: [f64; 3],
-    /// Strength relative to the axis.
+    /// Strength of the ray relative to the axis.
     strength: f64,
 }
 
@@ -85,15 +86,15 @@ struct BeamCone {
     cone: Cone,
     form: Form,
     bins: Bins,
-    /// Hits of the current ping.
+    /// Hits of the current ping's rays.
     hits: Vec<Option<Hit>>,
 }
 
 impl Cone {
-    /// A cone of `width_rad` with this many rays.
+    /// Creates a cone of `width_rad` with this many rays.
     ///
-    /// The first ray is the axis. The others fill the disc evenly in a sunflower pattern. The last two are at the edges
-    /// in the plane of turning, where an oblique wall is nearest and farthest.
+    /// The first ray is the axis. The others fill the disc evenly in a sunflower pattern. The last two are at the
+    /// cone's edges in the plane of turning, where an oblique wall is nearest and farthest.
     pub fn new(width_rad: f64, rays: usize) -> Self {
         let last = rays.max(2) - 1;
         let ray = |number: usize| {
@@ -111,14 +112,14 @@ impl Cone {
         Self { rays: (0..rays.max(1)).map(ray).collect() }
     }
 
-    /// Components of its rays along the beam's axis, along the tunnel, and perpendicular to both.
+    /// Components of the rays' directions along the beam's axis, along the tunnel, and perpendicular to both.
     ///
-    /// The axis comes first, the edges in the plane of turning last.
+    /// The axis comes first. The edges in the plane of turning come last.
     pub fn parts(&self) -> impl Iterator<Item = [f64; 3]> {
         self.rays.iter().map(|ray| ray.parts)
     }
 
-    /// Hits of the cone's rays within `far_m`, the axis first.
+    /// Hits of the cone's rays within `far_m`. The hit of the axis comes first.
     pub(crate) fn hits<'a>(
         &'a self,
         environment: &'a Environment,
@@ -164,7 +165,8 @@ impl EffectKind for BeamConeKind {
 
 /// Full width of a head's beam at a frequency, degrees.
 ///
-/// Source: Jorge et al. 2021, §6: 2.4 at 600 kHz, 1.4 at 1 MHz; linear between, as DUNE models it.
+/// Source: Jorge et al. 2021, §6: 2.4 degrees at 600 kHz and 1.4 at 1 MHz. In between the width is linear, as in DUNE's
+/// model.
 fn width_at_deg(frequency_khz: f64) -> f64 {
     2.4 - (frequency_khz - 600.0) / 400.0
 }
@@ -200,7 +202,7 @@ impl BeamCone {
         }
     }
 
-    /// Range of a ping from its rays' hits.
+    /// Range of a ping, from the hits of its rays.
     fn range_m(&mut self, ray: &Ray) -> Option<f64> {
         match self.form {
             Form::First => self.hits.iter().flatten().map(|hit| hit.range_m).min_by(f64::total_cmp),
@@ -209,10 +211,10 @@ impl BeamCone {
         }
     }
 
-    /// Range of the surface as defined by the paper.
+    /// Range of the surface by the paper's definition.
     ///
     /// Each ray's echo, weighted by beam strength and incidence, is shared between the two nearest range bins. The
-    /// surface is at the largest sum.
+    /// surface is in the bin with the largest sum.
     fn surface_m(&mut self, ray: &Ray) -> Option<f64> {
         for (hit, part) in self.hits.iter().zip(&self.cone.rays) {
             if let Some(hit) = hit {
@@ -239,7 +241,7 @@ fn look_in_cones(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_
         for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {
             beam.hits.clear();
             beam.hits.extend(beam.cone.hits(&scenery.environment, ray, reach.0));
-            // In the ground truth, the hit is that of the beam's axis.
+            // The hit in the ground truth is the hit of the beam's axis.
             ray.hit = beam.hits.first().copied().flatten();
             sounding.range_m = beam.range_m(ray);
         }

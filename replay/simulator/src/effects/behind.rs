@@ -1,9 +1,10 @@
-//! Heads that miss some of the commanded steps.
+//! Heads that lag behind their commands.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_sensor::measurement::Sounding;
 
-/// Offset of a head from its commands. Hosts command steps rather than angles, so a missed step is never made up.
+/// Offset of a head from its commanded angle. Hosts command steps rather than angles, so the head never makes up for a
+/// missed step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Behind {
     commanded_rad: Option<f64>,
@@ -13,7 +14,8 @@ pub(super) struct Behind {
 impl Behind {
     /// Applies the head's offset to the next ping.
     ///
-    /// `made` is false if the head missed the step to it. `told` is true if the reported angle includes the offset.
+    /// `made` is false if the head missed the step to this ping. `told` is true if the reported angle includes the
+    /// offset.
     pub(super) fn step(&mut self, sounding: &mut Sounding, made: bool, told: bool) {
         let commanded_rad = sounding.angle_rad;
         let step_rad =

@@ -16,7 +16,7 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// Changes bytes from devices at random: a bit is flipped, the byte is lost, or another byte is inserted before it.
+/// Changes bytes from devices at random: a bit is flipped, a byte is lost, or another byte is inserted before it.
 ///
 /// Each byte is affected independently. `flipped_per_million`, `dropped_per_million` and `inserted_per_million` are the
 /// rates, all zero by default. A message that loses all its bytes doesn't arrive. Bytes to devices are unchanged.
@@ -29,11 +29,11 @@ struct Parameters {
     inserted: f64,
 }
 
-/// Selects affected bytes by drawing the gaps between them; all bytes have the same probability.
+/// Selects the affected bytes. All bytes have the same probability, so the gaps between affected bytes are drawn.
 struct Hits {
     stream: Stream,
     kind: u64,
-    /// Logarithm of the probability that a byte isn't affected; zero if no byte is affected.
+    /// Logarithm of the probability that a byte isn't affected; zero if no byte is ever affected.
     ln_missed: f64,
     count: u64,
     next: u64,
@@ -99,7 +99,7 @@ impl Hits {
         hits
     }
 
-    /// Number of unaffected bytes before the next affected one, geometrically distributed.
+    /// Draws the number of unaffected bytes before the next affected one. The number is geometrically distributed.
     fn gap(&self) -> u64 {
         if self.ln_missed == 0.0 {
             return u64::MAX;
@@ -108,7 +108,8 @@ impl Hits {
         math::floor_to_i64(math::ln(u) / self.ln_missed).unsigned_abs()
     }
 
-    /// A number between 0 and 1 if this byte is affected. Call in order of bytes.
+    /// Returns a random number between 0 and 1 if this byte is affected; `None` otherwise. Must be called in order of
+    /// bytes.
     fn hit(&mut self, byte: u64) -> Option<f64> {
         if byte < self.next {
             return None;
@@ -131,7 +132,8 @@ impl ByteErrors {
         }
     }
 
-    /// Damages the messages, which keep their indices even if they lose all bytes. The outbox drops empty messages.
+    /// Damages the messages on the line. A message keeps its index even if it loses all its bytes; the outbox drops
+    /// empty messages.
     fn damage(&mut self, line: &mut Line) {
         let mut rest = std::mem::take(&mut self.rest);
         rest.clear();
@@ -165,7 +167,7 @@ impl ByteErrors {
     }
 }
 
-/// Maps `which` in (0, 1) to an integer in [0, `count`).
+/// Maps a number in (0, 1) to an integer in [0, `count`).
 fn below(count: f64, which: f64) -> u8 {
     u8::try_from(math::floor_to_i64(count * which)).unwrap_or_default()
 }

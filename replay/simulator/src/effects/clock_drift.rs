@@ -1,4 +1,4 @@
-//! Devices' clocks drift.
+//! Drifting clocks of devices.
 
 use bevy_ecs::prelude::Query;
 use headrace_config::{ConfigError, Section};
@@ -16,9 +16,10 @@ use crate::stages::Stage;
 
 /// The clock of a device that samples on its own schedule drifts at a constant rate.
 ///
-/// The device samples at the wrong times and stamps the times of its clock. Its seconds are `ppm` millionths too long,
-/// or a draw from a normal distribution with standard deviation `sd_ppm`; positive values sample late. Refused for
-/// heads and echosounders, which ping when the host requests it.
+/// The device samples at the wrong times, and its timestamps are those of its clock. The clock's seconds are too long
+/// by `ppm` millionths, or by a value drawn from a normal distribution with standard deviation `sd_ppm`. With positive
+/// values the device samples late. The effect is refused for heads and echosounders, which ping when the host requests
+/// a ping.
 pub(super) struct ClockDriftKind;
 
 #[derive(Debug, Clone, Copy)]

@@ -13,21 +13,21 @@ use crate::stretch::Stretch;
 use crate::trajectory::{Flow, Ground, Knots, Trajectory};
 
 const NAME: &str = "current";
-/// Steps per correlation time of a gust's speed.
+/// Number of drawn speeds per correlation time of the gusts.
 const STEPS: f64 = 8.0;
-/// Largest distance by which a current may carry the vehicle out of the tunnel, m; the same limit as for trajectories.
+/// Largest distance by which a current may carry the vehicle out of the tunnel, m. Trajectories have the same limit.
 const OUTSIDE_M: f64 = 20.0;
 /// Interval at which the trajectory is checked against [`OUTSIDE_M`], s.
 const LOOK_S: f64 = 5.0;
 
 /// The water flows along the tunnel and carries a vehicle that holds its speed through water.
 ///
-/// Legs and a pilot's course end at the same place, after another duration.
+/// Legs and a pilot's course end at the same place as without a current, after a different duration.
 ///
-/// `speed_mps` is positive towards growing chainage, from `from_m` to `to_m`. Several tables are several stretches, as
-/// on both sides of a leak. `gust_sd_mps`, in a table for the whole tunnel, adds a Gauss-Markov variation whose
-/// correlation falls to 1/e within `gust_s` (60 by default); the displacement by gusts isn't corrected. A trajectory
-/// over ground is independent of currents, so combining the two is refused.
+/// `speed_mps`, positive towards growing chainage, applies from `from_m` to `to_m`. Several tables define several
+/// stretches, as on both sides of a leak. `gust_sd_mps`, in a table for the whole tunnel, adds a Gauss-Markov variation
+/// whose correlation falls to 1/e within `gust_s` (60 by default). The pilot doesn't correct the displacement by gusts.
+/// A trajectory given over ground is independent of currents, so combining the two is refused.
 ///
 /// Source: Jorge et al. 2021, §9.1 (0.10 m/s through a leak, against the vehicle or with it).
 pub(super) struct CurrentKind;
@@ -135,7 +135,7 @@ mod tests {
     use crate::testing_motion::{Bench, LEGS, PILOT, WAYPOINTS};
 
     #[test]
-    fn a_steady_current_makes_legs_longer_or_shorter_in_time() {
+    fn steady_current_changes_the_duration_of_legs_but_not_their_end() {
         for (current_mps, duration_s) in [(0.1, 20.0 / 0.3 + 4.0 / 0.3), (-0.1, 20.0 / 0.1 + 4.0 / 0.5)] {
             let keys = format!("[effects.current]\nspeed_mps = {current_mps}\n");
             let trajectory = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 20\nspeed_mps = 0.2\n\
@@ -162,11 +162,11 @@ mod tests {
         }
     }
 
-    /// Checks the speed of a gust, its correlation after `gust_s`, and the displacement.
+    /// Checks the standard deviation of the gusts' speed, the correlation after `gust_s`, and the displacement.
     ///
-    /// For times t well above T the variance of the displacement is 2 sd^2 T t.
+    /// For times t well above the correlation time T, the variance of the displacement is 2 sd^2 T t.
     #[test]
-    fn gusts_have_their_strength_and_correlation_time() {
+    fn gusts_have_the_given_strength_and_correlation_time() {
         let current = Current { flow: Flow::default(), gust_sd_mps: 0.05, gust_s: 20.0, length_m: 1e6 };
         let (mut speeds, mut lagged, mut ways) = (0.0, 0.0, 0.0);
         let (runs, seconds) = (200_u32, 4000.0);
@@ -185,11 +185,11 @@ mod tests {
             ways += way_m * way_m / f64::from(runs);
         }
         let sd_mps = math::sqrt(speeds / count);
-        // Splines slightly smooth the quickest changes.
+        // The spline slightly smooths the fastest changes, so the standard deviation is a little below 0.05.
         assert!((0.046..0.051).contains(&sd_mps), "{sd_mps}");
         let correlation = lagged / speeds;
         assert!((correlation - math::exp(-1.0)).abs() < 0.04, "{correlation}");
-        // Each drawn speed lasts for one step, so the sum is that of the discrete process.
+        // Each drawn speed lasts for one step, so the variance is that of the sum of a discrete process.
         let kept = math::exp(-1.0 / STEPS);
         let wanted = 0.05 * 0.05 * seconds * (20.0 / STEPS) * (1.0 + kept) / (1.0 - kept);
         assert!((ways / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / f64::from(runs)), "{ways} {wanted}");

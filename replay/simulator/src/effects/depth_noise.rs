@@ -17,15 +17,15 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step number reserved for drawing the offset; no sample has it.
+/// Step number that is reserved for drawing the offset. No sample has it.
 const OFFSET: u64 = u64::MAX;
 
 /// A depth sensor's pressure has white noise, an offset, and a drift.
 ///
-/// `noise_pa` is the standard deviation of each sample's noise. `offset_sd_pa` is that of an offset drawn once per
-/// dive. `drift_pa` is that of a Gauss-Markov process whose correlation falls to 1/e within `tau_s` (3,600). All are
-/// zero by default. Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4
-/// (exact steps).
+/// The keys are standard deviations: `noise_pa` of each sample's noise, `offset_sd_pa` of an offset drawn once per
+/// dive, and `drift_pa` of a Gauss-Markov process. The correlation of that process falls to 1/e within `tau_s` (3,600).
+/// The standard deviations are zero by default. Source: Brown and Hwang, Introduction to Random Signals and Applied
+/// Kalman Filtering, 4th ed., §4.4 (exact steps).
 pub(super) struct DepthNoiseKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +41,7 @@ struct DepthNoise {
     parameters: Parameters,
     stream: Stream,
     offset_pa: f64,
-    /// The drift, in standard deviations, and its time.
+    /// Current value of the drift, in standard deviations. `before` is its time.
     drift: f64,
     before: Option<MonoNs>,
 }
@@ -91,7 +91,7 @@ fn disturb(mut sensors: Query<'_, '_, (&mut Samples<Pressure>, &mut DepthNoise)>
 }
 
 impl DepthNoise {
-    /// Error of a step's sample. Call once per step, in order.
+    /// Error of a step's sample, Pa. Must be called once per step, in order.
     fn error_pa(&mut self, step: u64, at: MonoNs) -> f64 {
         let Parameters { noise_pa, drift_pa, tau_s, .. } = self.parameters;
         let [white, wander] = self.stream.at(step).normal();
@@ -125,7 +125,7 @@ mod tests {
         assert!(lagged.abs() < 5.0 * 9e4 / math::sqrt(n), "{lagged}");
     }
 
-    /// Over a lag t, the mean square of a Gauss-Markov process's change is 2 sd^2 (1 - exp(-t / tau)).
+    /// Over a lag t, a Gauss-Markov process changes by a mean square of 2 sd^2 (1 - exp(-t / tau)).
     #[test]
     fn drift_changes_at_the_given_rate() {
         let parameters = Parameters { noise_pa: 0.0, offset_sd_pa: 0.0, drift_pa: 100.0, tau_s: 20.0 };
@@ -137,7 +137,7 @@ mod tests {
             let pairs = drift.iter().zip(drift.iter().skip(lag));
             let found = pairs.map(|(a, b)| (b - a) * (b - a)).sum::<f64>() / (drift.len() - lag) as f64;
             let wanted = 2e4 * (1.0 - math::exp(-(lag as f64) * 0.1 / 20.0));
-            // Independent stretches are about two tau long: 1,000 of them.
+            // Stretches of about two tau are independent. The series has 1,000 of them.
             assert!((found / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / 1000.0), "{lag}: {found} {wanted}");
         }
     }
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn offsets_of_many_dives_have_their_spread() {
+    fn offsets_of_many_dives_have_the_given_spread() {
         let offset_pa = |seed: u64| {
             let keys = "[effects.depth_noise]\noffset_sd_pa = 1000\n";
             let [plain, with] =
@@ -172,7 +172,7 @@ mod tests {
         let squares = offsets.iter().map(|pa| pa * pa / 1e6);
         let (second, fourth) = (squares.clone().sum::<f64>() / n, squares.map(|of| of * of).sum::<f64>() / n);
         assert!((second - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{second}");
-        // For a normal distribution it is 3, with variance 96 / n.
+        // For a normal distribution, the fourth moment is 3, and the variance of its estimate 96 / n.
         assert!((fourth - 3.0).abs() < 5.0 * math::sqrt(96.0 / n) && fourth > 1.5, "{fourth}");
     }
 

@@ -1,4 +1,4 @@
-//! Devices that break.
+//! Faults of devices.
 
 mod line;
 mod span;
@@ -21,18 +21,18 @@ use line::BrokenLine;
 use span::Span;
 use values::{Jumped, Stuck};
 
-/// A device breaks.
+/// A device has a fault.
 ///
-/// `kind` is the fault, `from_s` its start (seconds of the dive, 0), `for_s` its duration (to the end). Afterwards the
-/// device works as before.
+/// `kind` is the kind of fault, `from_s` its start in seconds from the dive's start (0), `for_s` its duration in
+/// seconds (until the dive's end). Afterwards the device works as before.
 ///
-/// - `stick`: it repeats its last value: range, pressure, attitude with rates and forces, velocity, or cable. A head
-///   goes on turning.
-/// - `jump`: its value is off by `size`: an echosounder's range by metres, a head's angle by degrees, depth by metres
-///   of water, an inertial unit's heading by degrees, a velocity by m/s along its x, the cable by metres. Required,
-///   from -1000 to 1000.
-/// - `die`: it sends nothing.
-/// - `babble`: it sends as many bytes as ever, but random ones.
+/// - `stick`: the device repeats its last value: range, pressure, attitude with rates and forces, velocity, or cable
+///   length. A head continues to turn.
+/// - `jump`: the device's value is off by `size`, which is required and from -1000 to 1000. The unit is metres for an
+///   echosounder's range and the cable length, degrees for a head's angle and an inertial unit's heading, metres of
+///   water for a depth, and m/s along the sensor's x for a velocity.
+/// - `die`: the device sends nothing.
+/// - `babble`: the device sends as many bytes as without the fault, but random ones.
 pub(super) struct DeviceFaultsKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +60,7 @@ enum Kind {
 const FAULTS: [(&str, Kind); 4] =
     [("stick", Kind::Stick), ("jump", Kind::Jump), ("die", Kind::Die), ("babble", Kind::Babble)];
 
-/// Longer than any dive, s.
+/// A time longer than any dive, s.
 const LONGEST_S: f64 = 1e6;
 
 impl EffectKind for DeviceFaultsKind {

@@ -1,4 +1,4 @@
-//! Detects an echo only if it is strong enough.
+//! Detection of echoes by their strength.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -24,12 +24,12 @@ mod sonar;
 /// A head detects an echo that is louder than the noise and, after amplification, louder than its threshold.
 ///
 /// The echo of a rough wall is the sum of many echoes. Its power is exponentially distributed about the mean given by
-/// the sonar equation. A ping therefore gets a return with probability exp(-1 / m), where m is that mean divided by the
-/// power that is just detected.
+/// the sonar equation. A ping therefore gets a return with probability exp(-1 / m), where m is the mean power divided
+/// by the power that is just detected.
 ///
-/// Keys, besides `from_m` and `to_m` of the stretch:
-/// - the water's `temperature_degc`, 0 to 40 (10), and its silt, `silt_gpl` in grams per litre, 0 to 100 (0), of grains
-///   of radius `grain_um`, 0.5 to 100 (10); both absorb sound.
+/// Keys, in addition to `from_m` and `to_m` of the stretch:
+/// - the water's `temperature_degc`, 0 to 40 (10), and its silt, `silt_gpl` in grams per litre, 0 to 100 (0), with
+///   grains of radius `grain_um`, 0.5 to 100 (10). Water and silt absorb sound.
 /// - the wall's backscatter relative to rough rock, `wall_db`, -60 to 20 (0).
 /// - the head's settings: `frequency_khz`, 600 to 1000 (that of its beam's width), `pulse_us`, 10 to 1000 (that of its
 ///   range setting), `gain_db`, 0 to 40 (20), `log_gain_db`, 10 to 40 (20), and `absorption_dbpm`, 0 to 2.55 (0.6 above

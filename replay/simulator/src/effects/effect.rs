@@ -6,17 +6,17 @@ use crate::builder::{Builder, Programs};
 use crate::error::SceneError;
 use crate::facts::Facts;
 
-/// A kind of effect, identified by its name in scenes.
+/// A kind of effect. Scenes identify it by its name.
 pub trait EffectKind: Sync {
-    /// Its name: `[effects.NAME]`.
+    /// Name of the effect: `[effects.NAME]`.
     fn name(&self) -> &'static str;
 
     /// Summary of the effect on one line.
     fn summary(&self) -> &'static str;
 
-    /// Reads its tables; there are several if `[[effects.NAME]]` differs by sensor.
+    /// Reads the effect's tables. There are several tables if `[[effects.NAME]]` differs by sensor.
     ///
-    /// Errors: a key that is missing, unknown or out of range; sensors that don't exist.
+    /// Errors: a key is missing, unknown or out of range; a named sensor doesn't exist.
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError>;
 }
 
@@ -27,8 +27,8 @@ pub trait Effect: Send + Sync {
         let _ = programs;
     }
 
-    /// Adds its systems, components and streams.
+    /// Adds the effect's systems, components and random streams.
     ///
-    /// Errors: it is inconsistent with the rest of the scene.
+    /// Errors: the effect is inconsistent with the rest of the scene.
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError>;
 }

@@ -1,9 +1,9 @@
-//! Directions about a beam, and reflection at a wall.
+//! Directions relative to a beam, and reflection at a wall.
 
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 
-/// A beam counts as along the tunnel if the component of its direction along it exceeds this.
+/// A beam counts as along the tunnel if the component of its direction along the tunnel exceeds this value.
 const ALONG: f64 = 0.9;
 
 /// Scalar product.
@@ -13,8 +13,9 @@ pub(super) fn dot(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
 
 /// Two unit vectors perpendicular to a beam's direction and to each other.
 ///
-/// The first is as nearly along the tunnel as possible. The second is across the tunnel, in the plane in which a head
-/// turns whose axis is along the tunnel. For a beam along the tunnel the first is as nearly upwards as possible.
+/// The first vector is as nearly along the tunnel as possible. The second is across the tunnel, in the plane of turning
+/// of a head whose axis is along the tunnel. For a beam along the tunnel, the first vector is as nearly upwards as
+/// possible.
 pub(super) fn square_to(direction: Vec3<Tunnel>) -> [Vec3<Tunnel>; 2] {
     let along = direction.x().abs() > ALONG;
     let towards = if along { Vec3::new(0.0, 0.0, 1.0) } else { Vec3::new(1.0, 0.0, 0.0) };
@@ -24,7 +25,7 @@ pub(super) fn square_to(direction: Vec3<Tunnel>) -> [Vec3<Tunnel>; 2] {
     [first, Vec3::new(second.x, second.y, second.z)]
 }
 
-/// Cosine of the incidence of a beam on a wall: 0 along the wall, 1 perpendicular to it.
+/// Cosine of the incidence of a beam on a wall: 0 along the wall, 1 perpendicular to the wall.
 ///
 /// `normal` is a unit vector towards the water.
 pub(super) fn squareness(direction: Vec3<Tunnel>, normal: Vec3<Tunnel>) -> f64 {
@@ -63,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mirrored_beam_keeps_its_length_and_its_incidence() {
+    fn mirrored_beam_keeps_its_length_and_incidence() {
         let (direction, normal) = (Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.0, 0.0, 1.0));
         assert_eq!(mirrored(direction, normal), Vec3::new(0.0, 0.6, 0.8));
         assert!((squareness(direction, normal) - 0.8).abs() < 1e-15);

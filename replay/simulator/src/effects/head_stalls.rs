@@ -18,15 +18,15 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Interval between the times at which a stall may begin.
+/// Interval between the possible starts of stalls.
 const STEP: DurNs = DurNs(100_000_000);
 
-/// From time to time a head stalls and pings repeatedly at its angle; afterwards it continues from there, so the offset
-/// remains.
+/// From time to time a head stalls and pings repeatedly at one angle. It then continues from that angle, so it remains
+/// offset from its commands.
 ///
-/// Stalls begin `per_hour` times per hour, with equal probability at any tenth of a second. They last `seconds =
-/// [least, most]`, drawn evenly, by default 2 to 20. A stall that begins during another may extend it. With `told`, the
-/// default, the head reports its true angle; without, the commanded one.
+/// Stalls begin `per_hour` times per hour, with equal probability at any tenth of a second. The duration is drawn evenly
+/// from `seconds = [least, most]`, by default 2 to 20. A stall that begins during another one may extend it. If `told` is
+/// true, as by default, the head reports its true angle; otherwise it reports the commanded angle.
 pub(super) struct HeadStallsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -89,7 +89,7 @@ impl Stalls {
         Self { stream, chance, seconds: parameters.seconds, next_step: 0, until: START }
     }
 
-    /// Whether the head stalls at this time. Call in order of time.
+    /// Whether the head stalls at this time. Must be called in order of time.
     fn at(&mut self, at: MonoNs) -> bool {
         let step = at.since(START).0.max(0).unsigned_abs() / STEP.0.unsigned_abs();
         while self.next_step <= step {
@@ -123,9 +123,9 @@ mod tests {
     use super::*;
     use crate::testing_motion::{Bench, refusal, same_in_any_slices};
 
-    /// For stalls that may overlap, the share of time without one is exp(-rate x mean length).
+    /// If stalls may overlap, the share of time without a stall is exp(-rate x mean length).
     #[test]
-    fn stalls_have_their_rate_and_length() {
+    fn stalls_have_the_given_rate_and_length() {
         let parameters = Parameters { per_hour: 60.0, seconds: [2.0, 10.0], told: true };
         let mut stalls = Stalls::new(Stream::new(5, "head_stalls", "head"), &parameters);
         let (hours, step_s) = (200, 0.1);
@@ -138,7 +138,7 @@ mod tests {
         }
         let free = math::exp(-6.0 / 60.0);
         let share = f64::from(still) / f64::from(count);
-        // Spread over 12,000 stalls.
+        // The tolerance allows for 12,000 stalls.
         assert!((share - (1.0 - free)).abs() < 5.0 * 0.095 / math::sqrt(12_000.0) * 1.5, "{share}");
         let wanted = f64::from(hours) * 60.0 * free;
         assert!((f64::from(begun) - wanted).abs() < 5.0 * math::sqrt(wanted), "{begun} {wanted}");

@@ -20,21 +20,22 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step number reserved for the draws of constant parts; no sample has it.
+/// Step number that is reserved for drawing the constant parts. No sample has it.
 const CONSTANT: u64 = u64::MAX;
-/// Block of the tilt's draws, after the biases'.
+/// Block of random numbers for the tilt, after the blocks for the biases.
 const TILT: u64 = 3;
 
 /// Varying and constant biases of an inertial unit, independent for each axis.
 ///
 /// - `gyro_degps` and `accel_mps2` are the standard deviations of first-order Gauss-Markov processes whose correlation
-///   falls to 1/e within `tau_s` (300 by default). They are stationary from the first sample.
-/// - `gyro_constant_degps` and `accel_constant_mps2` are standard deviations of parts that are constant through the
+///   falls to 1/e within `tau_s` (300 by default). The processes are stationary from the first sample.
+/// - `gyro_constant_degps` and `accel_constant_mps2` are standard deviations of biases that are constant during the
 ///   dive.
 /// - `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical at a constant rate, positive to the
 ///   left.
 /// - `tilt_deg` is the standard deviation of a similar process that tilts the attitude, with time constant `tilt_tau_s`
-///   (30 by default). The effect of biases and accelerations on the unit's own filter isn't simulated otherwise.
+///   (30 by default). Apart from this, the influence of biases and accelerations on the unit's own filter isn't
+///   simulated.
 ///
 /// All are zero by default. Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th
 /// ed., §4.4 (exact steps).
@@ -57,14 +58,15 @@ struct ImuBias {
     parameters: Parameters,
     stream: Stream,
     constant: [f64; 6],
-    /// Turn rates, then forces, in standard deviations.
+    /// Current varying biases of turn rates, then of forces, in standard deviations.
     wandering: [f64; 6],
-    /// Roll and pitch of the attitude, in standard deviations.
+    /// Current tilt in roll and pitch, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Last sample interval, with the correlation over it and the weight of the new draw, for biases and tilt.
+    /// Last sample interval, with two factors for biases and for tilt: the correlation over the interval, and the
+    /// weight of a new draw.
     ///
-    /// Kept because most samples come at one rate.
+    /// The factors are kept because most samples have the same interval.
     kept: (DurNs, [[f64; 2]; 2]),
 }
 
@@ -223,8 +225,8 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Over many seeds, compares the variance at the first sample and much later, and the correlation exp(-t / tau)
-    /// between them.
+    /// Compares, over many seeds, the variance at the first sample and much later, and the correlation exp(-t / tau)
+    /// between the two.
     #[test]
     fn biases_are_stationary_and_decorrelate_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);
@@ -250,7 +252,8 @@ mod tests {
         assert!((both / n - wanted).abs() < 5.0 * math::sqrt((1.0 + wanted * wanted) / n), "{}", both / n);
     }
 
-    /// Twice as many samples give the same process: the variance of the change over a time doesn't depend on the rate.
+    /// Twice as many samples give the same process: the variance of the change over a time doesn't depend on the sample
+    /// rate.
     #[test]
     fn bias_change_depends_on_time_not_on_sample_count() {
         let change = |millis: i64| {
@@ -287,7 +290,7 @@ mod tests {
         }
     }
 
-    /// The tilt is stationary, has the correlation of its time constant, and acts only about level axes.
+    /// The tilt is stationary, has the correlation given by its time constant, and acts only about level axes.
     #[test]
     fn tilt_varies_about_level_axes_without_changing_rates_or_forces() {
         let keys = "[effects.imu_bias]\ntilt_deg = 0.5\ntilt_tau_s = 2\n";
@@ -304,7 +307,7 @@ mod tests {
             .collect();
         let lag = plain.iter().position(|inertia| inertia.at.since(plain[0].at).0 >= 2_000_000_000).unwrap();
         let wanted = f64::to_radians(0.5) * f64::to_radians(0.5);
-        // For a process with correlation time tau, n samples over t seconds count as t / (2 tau).
+        // For a process with correlation time tau, the samples of t seconds are worth t / (2 tau) independent samples.
         let worth = plain.len() as f64 / lag as f64 / 2.0;
         for axis in 0..2 {
             let product = |lag: usize| {

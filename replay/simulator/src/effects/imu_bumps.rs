@@ -1,4 +1,4 @@
-//! The vehicle bumps into things.
+//! Bumps of the vehicle against obstacles.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -18,20 +18,20 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Length of the time spans that contain at most one bump each, s.
+/// Length of a time span, s. A span contains at most one bump.
 const SPAN_S: f64 = 1.0;
 
-/// From time to time the vehicle bumps into the wall, a rock or its own cable: it is pushed one way and swings back.
+/// From time to time the vehicle bumps into the wall, a rock or its own cable. It is pushed one way and swings back.
 ///
 /// Keys:
-/// - `per_hour`, to 1,800 (needed).
-/// - `speed_mps = [least, most]`, the speed that a bump gives ([0.02, 0.1]), drawn evenly, in an evenly drawn
-///   direction.
+/// - `per_hour`, up to 1,800 (required).
+/// - `speed_mps = [least, most]`, the speed that a bump gives the vehicle ([0.02, 0.1]). Speed and direction are drawn
+///   evenly.
 /// - `seconds`, from the first touch until the vehicle is at rest again, 0.01 to 1 (0.2).
 ///
-/// The force is one period of a sine, so the speed is gained and lost again. The vehicle's place changes by
-/// millimetres, which the true trajectory leaves out. Sensors on one vehicle feel the same bumps. Source: momentum; the
-/// speeds are those at which such vehicles travel.
+/// The force is one period of a sine, so the speed is gained and lost again. The vehicle moves by some millimetres,
+/// which the true trajectory ignores. Sensors on one vehicle feel the same bumps. Source: momentum; the speeds are
+/// those at which such vehicles travel.
 pub(super) struct ImuBumpsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -92,7 +92,7 @@ fn bump(mut units: Query<'_, '_, (&mut Samples<Inertia>, &ImuBumps)>) {
 }
 
 impl ImuBumps {
-    /// Speed gained between two times by bumps, m/s.
+    /// Velocity gained from bumps between two times, m/s; `None` if there is no bump.
     fn gained_mps(&self, [from_s, until_s]: [f64; 2]) -> Option<Vec3<Sensor>> {
         let last = math::floor_to_i64(until_s / SPAN_S);
         let first = math::floor_to_i64((from_s - self.parameters.seconds) / SPAN_S).max(0);
@@ -104,13 +104,13 @@ impl ImuBumps {
         each.reduce(|a, b| a + b)
     }
 
-    /// Share of a bump's speed that the vehicle has `after_s` after the bump's start.
+    /// Share of a bump's speed that the vehicle has `after_s` seconds after the bump's start.
     fn share(&self, after_s: f64) -> f64 {
         let turn = (after_s / self.parameters.seconds).clamp(0.0, 1.0);
         (1.0 - math::cos(math::TAU * turn)) / 2.0
     }
 
-    /// Start time and speed of the bump in a span, if there is one.
+    /// Start time and velocity of the bump in a span, if the span has one.
     fn drawn(&self, span: u64) -> Option<(f64, Vec3<Sensor>)> {
         let [chance, along] = self.stream.at(span).uniform();
         if chance >= self.parameters.chance {
@@ -134,10 +134,10 @@ mod tests {
 
     const KEYS: &str = "[effects.imu_bumps]\nper_hour = 400\nspeed_mps = [0.05, 0.2]\nseconds = 0.3\n";
 
-    /// Bumps in the difference of two dives have the right number, length and strength, and leave the vehicle at its
-    /// previous speed.
+    /// The bumps, found as the difference of two dives, have the given rate, length and strength. After a bump the
+    /// vehicle has its previous speed.
     #[test]
-    fn bumps_have_their_rate_length_and_strength() {
+    fn bumps_have_the_given_rate_length_and_strength() {
         let (plain, with) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let period_s = plain[0].period.as_secs_f64();
         let force: Vec<Vec3<Sensor>> =
@@ -147,7 +147,7 @@ mod tests {
             force.chunk_by(|a, b| felt(a) == felt(b)).filter(|run| felt(&run[0])).collect();
         let (spans, chance) = (640.0, 400.0 / 3600.0);
         let n = bumps.len() as f64;
-        // Two overlapping bumps are found as one.
+        // Two overlapping bumps are found as a single bump.
         assert!((n - spans * chance).abs() < 5.0 * math::sqrt(spans * chance), "{n}");
         let mut single = 0;
         for bump in &bumps {
@@ -168,17 +168,17 @@ mod tests {
         assert!(single * 4 > bumps.len() * 3);
     }
 
-    /// Sizes and directions of a seed's bumps in `spans` time spans.
+    /// Velocities of a seed's bumps in `spans` time spans.
     fn bumps(spans: u64) -> Vec<Vec3<Sensor>> {
         let parameters = Parameters { chance: 0.5, speed_mps: [0.05, 0.2], seconds: 0.3 };
         let bumps = ImuBumps { parameters, stream: Stream::new(5, "imu_bumps", "vehicle") };
         (0..spans).filter_map(|span| bumps.drawn(span)).map(|(_, speed)| speed).collect()
     }
 
-    /// Directions are even on a sphere: each component has mean 0 and mean square 1/3. Sizes are even from least to
-    /// most, in mean and variance.
+    /// Directions are evenly distributed on a sphere: each component has mean 0 and mean square 1/3. Sizes are evenly
+    /// distributed from least to most, as mean and variance show.
     #[test]
-    fn bumps_have_even_directions_and_sizes() {
+    fn bump_directions_and_sizes_are_uniformly_distributed() {
         let bumps = bumps(20_000);
         let n = bumps.len() as f64;
         let mean = |of: &dyn Fn(&Vec3<Sensor>) -> f64| bumps.iter().map(of).sum::<f64>() / n;

@@ -17,17 +17,17 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Blocks of random numbers; each vector takes two.
+/// Blocks of random numbers. Each vector takes two blocks.
 const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;
 
 /// White noise of an inertial unit, independent for each axis.
 ///
-/// `gyro_degps_rthz` and `accel_mps2_rthz` are densities. The sd of a sample is the density times the root of the
-/// unit's rate, and that of an integral over t seconds is the density times the root of t. `attitude_deg` is the sd of
-/// the rotation of each attitude about each axis of the unit. All are zero by default. Source: IEEE Std 952-1997, C.1
-/// (angle random walk); a MEMS unit's data sheet has 0.007 deg/s/sqrt(Hz).
+/// `gyro_degps_rthz` and `accel_mps2_rthz` are densities. The standard deviation of a sample is the density times the
+/// root of the unit's rate. The standard deviation of an integral over t seconds is the density times the root of t.
+/// `attitude_deg` is the standard deviation of the rotation of each attitude about each axis of the unit. All are zero
+/// by default. Source: IEEE Std 952-1997, C.1 (angle random walk); a MEMS unit's data sheet has 0.007 deg/s/sqrt(Hz).
 pub(super) struct ImuNoiseKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -117,9 +117,9 @@ mod tests {
     const KEYS: &str =
         "[effects.imu_noise]\ngyro_degps_rthz = 0.007\naccel_mps2_rthz = 0.001\nattitude_deg = 0.5\n";
 
-    /// For every t, means over t of white noise with density N have an Allan deviation of N / sqrt(t).
+    /// White noise with density N has an Allan deviation of N / sqrt(t) for means over any time t.
     #[test]
-    fn rates_and_forces_have_their_densities_over_any_time() {
+    fn rate_and_force_noise_have_the_given_densities_over_any_time() {
         let (plain, noisy) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let period_s = plain[0].period.as_secs_f64();
         let parts = |f: fn(&Inertia) -> [f64; 3]| -> Vec<[f64; 3]> {
@@ -140,7 +140,7 @@ mod tests {
                     let n = (means.len() - 1) as f64;
                     let variance = squares / n / 2.0;
                     let wanted = density * density / (period_s * length as f64);
-                    // Neighbouring differences share a mean, so the variance of the estimate is 3/n of its square.
+                    // Neighbouring differences share a mean, so the estimate's variance is 3/n of its square.
                     let off = variance / wanted - 1.0;
                     assert!(off.abs() < 5.0 * math::sqrt(3.0 / n), "{length} {axis}: {off}");
                 }

@@ -1,4 +1,4 @@
-//! Thrusters shake inertial units.
+//! Vibration of inertial units caused by thrusters.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -21,11 +21,12 @@ use crate::stages::Stage;
 /// Thrusters shake an inertial unit at one frequency.
 ///
 /// Keys:
-/// - `frequency_hz`, 1 to 2,000 (needed): the shaft's turns per second, or that times the number of blades.
+/// - `frequency_hz`, 1 to 2,000 (required): the shaft's turns per second, or that number times the number of blades.
 /// - `accel_mps2` and `gyro_degps`, the amplitudes along and about each axis of the unit, zero by default.
 ///
-/// Each axis has its own phase. A unit that integrates between samples sees the mean over its period T. The amplitude
-/// is therefore multiplied by sin(pi f T) / (pi f T), and frequencies above half the sample rate appear below it.
+/// Each axis has its own phase. A unit that integrates between samples sees the mean over its sample period T. The
+/// amplitude is therefore multiplied by sin(pi f T) / (pi f T). Frequencies above half the sample rate appear as lower
+/// frequencies.
 /// Source: sampling theorem; strapdown units integrate between their outputs.
 pub(super) struct ImuVibrationKind;
 
@@ -39,7 +40,7 @@ struct Parameters {
 #[derive(Component)]
 struct ImuVibration {
     parameters: Parameters,
-    /// Phases of forces, then of turn rates, by axis, radians.
+    /// Phases by axis, of forces and then of turn rates, radians.
     phases_rad: [f64; 6],
 }
 
@@ -93,7 +94,7 @@ impl ImuVibration {
         let Parameters { frequency_hz, accel_mps2, gyro_radps } = self.parameters;
         let half_rad = math::TAU / 2.0 * frequency_hz * inertia.period.as_secs_f64();
         let kept = if half_rad > 0.0 { math::sin(half_rad) / half_rad } else { 1.0 };
-        // Whole turns are removed first, so that no digits are lost hours into a dive.
+        // Whole turns are removed first, so that no digits are lost after hours of diving.
         let turns = frequency_hz * inertia.at.since(START).as_secs_f64();
         let now_rad = math::TAU * math::wrap(turns, 1.0);
         let [a, b, c, d, e, f] = self.phases_rad.map(|phase_rad| math::sin(now_rad + phase_rad));
@@ -107,10 +108,11 @@ mod tests {
     use super::*;
     use crate::testing_motion::{Bench, refusal, same_in_any_slices};
 
-    /// Component of a measurement along or about one axis.
+    /// A function that returns the component of a measurement along or about one axis.
     type Axis = fn(&Inertia) -> f64;
 
-    /// Compares samples with an oscillation of 83 Hz, integrated over each sample's period in many small steps.
+    /// Compares the samples with an oscillation of 83 Hz that is integrated over each sample's period in many small
+    /// steps.
     ///
     /// One phase per axis, found from the first samples, fits all samples, and no two axes share a phase.
     #[test]

@@ -1,4 +1,4 @@
-//! Heads that share a frequency hear each other.
+//! Interference between heads that share a frequency.
 
 mod pings;
 
@@ -24,24 +24,26 @@ use crate::sensing::{Ray, Rays, Samples, Scenery, Slice, Source};
 use crate::stages::Stage;
 use pings::{Ping, Pings};
 
-/// Heads that share a frequency hear each other: a head takes the first sound after its own ping for its echo.
+/// Heads that share a frequency hear each other. A head takes the first sound after its own ping as its echo.
 ///
-/// Another head's ping arrives by reflection at the point where its beam meets the wall, or directly if its beam points
-/// at this head's body. Its apparent range is (c (t_other - t_own) + path) / 2. If that is less than the range of the
-/// own echo and at least the head's least range, it is reported instead.
+/// Another head's ping arrives by reflection at the point where the other beam meets the wall, or directly if the other
+/// beam points at this head's body. The ping's apparent range is (c (t_other - t_own) + path) / 2. The head reports the
+/// apparent range if it is less than the range of the head's own echo, and not less than the head's least range.
 ///
-/// The ping is always heard if it arrives within this head's beam; otherwise it is heard through side lobes with a
-/// probability. A wall point is within the beam up to half the beam's width plus a margin from its axis; the other
-/// head, up to half the width plus half its body's angular size.
+/// The ping is always heard if it arrives within this head's beam. Otherwise it is heard through side lobes with a
+/// probability. A wall point is within the beam if its angle from the axis is at most half the beam's width plus a
+/// margin. The other head is within the beam if its angle is at most half the beam's width plus half the angular size
+/// of the other head's body.
 ///
 /// Keys:
-/// - `sensors`, those that share a frequency, two or more (all heads), one table per frequency.
-/// - `share`, the probability through side lobes, from 0 to 1 (0).
-/// - `margin_deg`, from 0 to 45 (half the other's beam, since the insonified patch is that wide).
+/// - `sensors`, two or more heads that share a frequency (all heads). There is one table per frequency.
+/// - `share`, the probability of hearing through side lobes, from 0 to 1 (0).
+/// - `margin_deg`, from 0 to 45. The default is half the other head's beam width, since the insonified patch is that
+///   wide.
 ///
 /// Heads whose bodies overlap are idealised ones and don't hear each other. Pings of another head that begin while a
-/// head is already listening are extrapolated from the two pings before. That is wrong for a ping or two when a head
-/// turns round.
+/// head is already listening are extrapolated from the two pings before. The extrapolation is wrong for one or two
+/// pings when a head reverses.
 ///
 /// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, which plans with the same two paths.
 pub(super) struct InterferenceKind;
@@ -58,7 +60,7 @@ struct Parameters {
     margin_rad: Option<f64>,
 }
 
-/// A head in a group that shares a frequency.
+/// A head in a group of heads that share a frequency.
 #[derive(Component)]
 struct Hears {
     parameters: Parameters,
@@ -108,7 +110,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Adds the slice's pings and drops pings that can no longer be heard.
+/// Adds the slice's pings to each head, and drops pings that can no longer be heard.
 fn remember(
     slice: Res<'_, Slice>,
     scenery: Res<'_, Scenery>,
@@ -156,7 +158,7 @@ fn listen(
     }
 }
 
-/// A head listening after its own ping.
+/// A head that listens after its own ping.
 struct Ear<'a> {
     scenery: &'a Scenery,
     hears: &'a Hears,
@@ -164,7 +166,7 @@ struct Ear<'a> {
     ray: &'a Ray,
     stopped: bool,
     step: u64,
-    /// Ranges between which a sound would be taken for the echo, m.
+    /// Range limits between which a sound is taken as the echo, m.
     within_m: [f64; 2],
     /// Whether another head's ping has been heard.
     heard: bool,
@@ -204,7 +206,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Considers a ping that arrives directly from a head whose beam points at this one.
+    /// Considers a ping that arrives directly, from a head whose beam points at this one.
     fn straight(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
         let way_m = (ping.origin - self.ray.origin).norm();
         let range_m = f64::midpoint(later_m, way_m);
@@ -223,7 +225,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound at this range precedes all others and isn't below the least range.
+    /// Whether a sound at this range arrives before all other sounds, and not below the least range.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }
@@ -239,9 +241,9 @@ impl Ear<'_> {
 }
 
 impl Hears {
-    /// Upper bound of the distance from which a wall still returns this head's sound, m.
+    /// Upper bound of the distance at which a wall still reflects this head's sound, m.
     fn rings_m(&self) -> f64 {
-        // A factor of 1.5 exceeds any difference in the speed of sound.
+        // The factor of 1.5 is larger than any ratio of two speeds of sound.
         self.spec.range_m[1] * 1.5
     }
 }

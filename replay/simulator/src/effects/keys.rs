@@ -1,22 +1,22 @@
-//! Keys shared by several effects.
+//! Keys that several effects share.
 
 use std::ops::RangeInclusive;
 
 use headrace_config::{ConfigError, Section};
 
-/// Accepts a single table, for an effect on the vehicle or the tunnel.
+/// Accepts only a single table, for an effect on the vehicle or the tunnel.
 ///
-/// Errors: more than one table.
+/// Errors: there is more than one table.
 pub(super) fn only_one(tables: Vec<Section<'_>>) -> Result<Vec<Section<'_>>, ConfigError> {
     match tables.get(1) {
-        Some(second) => Err(second.invalid_itself("is a second table; this effect has one")),
+        Some(second) => Err(second.invalid_itself("is a second table; this effect allows only one")),
         None => Ok(tables),
     }
 }
 
 /// Reads two numbers `[least, most]`.
 ///
-/// Errors: not two numbers, one outside `allowed`, or the wrong order.
+/// Errors: the value isn't two numbers, a number is outside `allowed`, or the order is wrong.
 pub(super) fn span(
     table: &Section<'_>,
     key: &'static str,
@@ -32,7 +32,7 @@ pub(super) fn span(
 
 /// Reads a number that defaults to zero.
 ///
-/// Errors: outside `allowed`.
+/// Errors: the number is outside `allowed`.
 pub(super) fn or_zero(
     table: &Section<'_>,
     key: &'static str,
@@ -41,7 +41,7 @@ pub(super) fn or_zero(
     Ok(table.number(key, allowed)?.unwrap_or(0.0))
 }
 
-/// Checks that an effect does something.
+/// Checks that an effect changes something.
 ///
 /// Errors: all of these keys are zero or absent.
 pub(super) fn some_not_zero(table: &Section<'_>, values: &[(&'static str, f64)]) -> Result<(), ConfigError> {
@@ -51,7 +51,7 @@ pub(super) fn some_not_zero(table: &Section<'_>, values: &[(&'static str, f64)])
     let keys: Vec<&str> = values.iter().map(|(key, _)| *key).collect();
     match keys.as_slice() {
         [] => Ok(()),
-        [only] => Err(table.invalid(only, "must not be zero, or the effect has none")),
+        [only] => Err(table.invalid(only, "must not be zero: the effect would change nothing")),
         [first, others @ ..] => {
             Err(table.invalid(first, &format!("or {} must not be zero", others.join(" or "))))
         }

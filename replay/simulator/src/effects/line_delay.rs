@@ -1,4 +1,4 @@
-//! Messages come late.
+//! Delay of messages.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -16,7 +16,7 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// All senses.
+/// The senses of all sensors.
 pub(super) const SENSES: [Sense; 6] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether];
 
@@ -128,8 +128,8 @@ mod tests {
         }
     }
 
-    /// Messages are far apart, so that none delays the next: mean and variance are those of the exponential
-    /// distribution.
+    /// Messages are far apart, so that none delays the next one. Mean and variance of the delay are then those of an
+    /// exponential distribution.
     #[test]
     fn jitter_is_exponential() {
         let parameters = Parameters { latency_s: 0.0, jitter_s: 0.003 };

@@ -1,4 +1,4 @@
-//! Steel in the lining disturbs compasses.
+//! Disturbance of compasses by steel in the lining.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -18,15 +18,15 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of a tunnel stretch that contains at most one random disturbance, m.
+/// Length of a tunnel stretch, m. A stretch contains at most one random disturbance.
 const CELL_M: f64 = 1.0;
 
 /// Steel turns the attitude of an inertial unit about the vertical.
 ///
 /// The turn is a raised cosine of the vehicle's chainage, largest in the middle of the disturbance. `places` are tables
-/// of `chainage_m` (the middle), `length_m` and `deg`, positive to the left. `per_100m` adds places at random,
-/// `length_m` long (5 by default), with an angle drawn evenly up to `up_to_deg` (10 by default) either way.
-/// Disturbances belong to the tunnel: all units see the same ones, and overlapping ones add.
+/// of `chainage_m` (the middle), `length_m` and `deg`, positive to the left. `per_100m` adds disturbances at random
+/// places, each `length_m` long (5 by default). Their angles are drawn evenly, up to `up_to_deg` (10 by default) either
+/// way. Disturbances belong to the tunnel: all units see the same disturbances. Overlapping disturbances add up.
 pub(super) struct MagneticDisturbanceKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,7 @@ struct Disturbance {
     tunnel_m: f64,
 }
 
-/// Disturbances, sorted by their middle.
+/// Disturbances, sorted by the chainage of their middle.
 #[derive(Clone, Component)]
 struct Steel {
     places: Vec<Place>,
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn random_places_have_their_rate_and_strength() {
+    fn random_places_have_the_given_rate_and_strength() {
         let disturbance = Disturbance {
             per_100m: 5.0,
             up_to_rad: 0.2,

@@ -1,4 +1,4 @@
-//! Some pings get no return.
+//! Pings without a return.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -19,15 +19,17 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Some pings get no return: a random share, singly or in runs; pings at grazing incidence; and pings at far walls.
+/// Some pings get no return: a random share of all pings, singly or in runs; pings at grazing incidence; and pings at
+/// far walls.
 ///
 /// The three parts are independent of each other, and at least one is required. Keys:
 /// - `from_m` and `to_m` of the stretch in which returns are lost.
 /// - `share` of all pings, from 0 to 0.95 (0), and the mean length of their runs, `mean_run` pings, from share / (1 -
 ///   share), or 1 if that is more, to 10,000 (1 / (1 - share): independent pings).
-/// - `grazing_from_deg` and `grazing_to_deg`, the incidence beyond which some, and from which all, are lost, from 0,
-///   perpendicular to the wall, to 90.
-/// - `far_from_m` and `far_to_m`, the same for the range, from 0 to 200 m.
+/// - `grazing_from_deg` and `grazing_to_deg`, the incidence above which some pings are lost, and the incidence from
+///   which all are lost; from 0, perpendicular to the wall, to 90.
+/// - `far_from_m` and `far_to_m`, the range above which some pings are lost, and the range from which all are lost;
+///   from 0 to 200 m.
 ///
 /// Between the two values of a pair the share grows linearly; equal values give a sharp edge. Source: runs after
 /// Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39, 1960.
@@ -40,7 +42,7 @@ struct Parameters {
     far: Option<Ramp>,
 }
 
-/// Share lost: 0 up to `from`, 1 from `to`, linear between.
+/// Share of lost pings: 0 up to `from`, 1 from `to` on, and linear in between.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Ramp {
     from: f64,
@@ -51,7 +53,7 @@ struct Ramp {
 struct MissingReturns {
     places: Places<Parameters>,
     stream: Stream,
-    /// Whether the last ping was lost in a run; `None` before the first.
+    /// Whether the last ping was lost in a run; `None` before the first ping.
     in_run: Option<bool>,
 }
 
@@ -115,7 +117,8 @@ impl Effect for PerSensor<Places<Parameters>> {
 }
 
 impl Parameters {
-    /// Whether the ping of a step gets no return. Call once per step, in order; `in_run` is its state.
+    /// Whether the ping of a step gets no return. Must be called once per step, in order. `in_run` keeps the state of
+    /// the runs.
     fn loses(&self, in_run: &mut Option<bool>, drawn: [f64; 2], ray: &Ray, echo: Echo) -> bool {
         let [first, second] = drawn;
         let runs = self.runs.is_some_and(|runs| runs.next(*in_run, first));
@@ -130,11 +133,11 @@ impl Parameters {
     }
 }
 
-/// The echo of a ping so far.
+/// The echo of a ping before this effect.
 #[derive(Debug, Clone, Copy)]
 struct Echo {
     range_m: Option<f64>,
-    /// Whether it comes from a part of the vehicle.
+    /// Whether the echo comes from a part of the vehicle.
     stopped: bool,
 }
 
@@ -176,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_have_their_mean_length_and_keep_the_share() {
+    fn runs_have_the_given_mean_length_and_share() {
         let (share, mean) = (0.2, 8.0);
         let dive = Dive { seconds: 2000.0, ..Dive::with_head() };
         let lost = lost(&dive, "share = 0.2\nmean_run = 8");
@@ -186,7 +189,7 @@ mod tests {
             .map(<[bool]>::len)
             .collect();
         let (count, whole) = (runs.len() as f64, lost.len() as f64);
-        // Lengths are geometric, with variance mean (mean - 1).
+        // Run lengths are geometrically distributed, with variance mean (mean - 1).
         let found = runs.iter().sum::<usize>() as f64 / count;
         assert!((found - mean).abs() < 5.0 * math::sqrt(mean * (mean - 1.0) / count), "{found}");
         assert_share(runs.iter().filter(|run| **run == 1).count(), runs.len(), 1.0 / mean);
@@ -207,7 +210,7 @@ mod tests {
             let (hit, _) = row.wall().unwrap();
             let headrace_sensor::measurement::Sounding { angle_rad, range_m, .. } =
                 row.sounding.unwrap().measured;
-            // A wall of the rectangle: incidence is the angle to the nearest axis.
+            // The tunnel is a rectangle, so the incidence is the angle to the nearest axis.
             let across = math::sin(angle_rad).abs();
             let square = if hit.normal.z().abs() > 0.5 { math::cos(angle_rad).abs() } else { across };
             let incidence_deg = math::acos(square).to_degrees();

@@ -1,4 +1,4 @@
-//! The effects that a scene may name, one file and one plugin each.
+//! The effects that a scene may name. Each has a file of its own.
 //!
 //! An effect that isn't named adds no system, component or random number.
 
@@ -59,20 +59,20 @@ pub use beam_cone::Cone;
 pub use effect::{Effect, EffectKind};
 pub use targets::PerSensor;
 
-/// All effects. Within a stage, systems run in this order, whatever the order of the scene.
+/// All effects. Within a stage, systems run in this order, whatever the order in the scene.
 pub const KINDS: [&dyn EffectKind; 38] = [
-    // The vehicle, if it differs from its file.
+    // Differences of the vehicle from its file.
     &mount_error::MountErrorKind,
-    // Turning of heads, and the pose from which they look.
+    // Turning of heads, and the pose from which heads look.
     &start_phase_error::StartPhaseErrorKind,
     &sector_end_slowing::SectorEndSlowingKind,
     &skipped_steps::SkippedStepsKind,
     &head_stalls::HeadStallsKind,
     &motion_within_turn::MotionWithinTurnKind,
-    // Wall and obstacles that a beam meets.
+    // Objects that a beam meets: wall and obstacles.
     &beam_cone::BeamConeKind,
     &occlusion::OcclusionKind,
-    // Sound paths.
+    // Paths of sound.
     &echo_strength::EchoStrengthKind,
     &multipath::MultipathKind,
     &side_lobes::SideLobesKind,
@@ -97,13 +97,13 @@ pub const KINDS: [&dyn EffectKind; 38] = [
     &imu_vibration::ImuVibrationKind,
     &imu_bumps::ImuBumpsKind,
     &magnetic_disturbance::MagneticDisturbanceKind,
-    // The cable.
+    // Cable.
     &tether_slack::TetherSlackKind,
     &tether_scale::TetherScaleKind,
     &tether_slip::TetherSlipKind,
     &tether_lag::TetherLagKind,
     &tether_quantum::TetherQuantumKind,
-    // Devices that break.
+    // Faults of devices.
     &device_faults::DeviceFaultsKind,
     // Clocks and lines.
     &clock_drift::ClockDriftKind,
@@ -114,14 +114,14 @@ pub const KINDS: [&dyn EffectKind; 38] = [
 /// The effects that a scene names, in the order of [`KINDS`].
 pub struct Named(pub(crate) Vec<(&'static dyn EffectKind, Box<dyn Effect>)>);
 
-/// The effect with this name.
+/// Finds an effect by its name.
 pub(crate) fn named(name: &str) -> Option<&'static dyn EffectKind> {
     KINDS.into_iter().find(|kind| kind.name() == name)
 }
 
 /// Reads the `[effects]` table.
 ///
-/// Errors: a name that isn't an effect; see [`EffectKind::read`].
+/// Errors: a name isn't an effect; see [`EffectKind::read`].
 pub(crate) fn parse(section: Option<Section<'_>>, facts: &Facts) -> Result<Named, ConfigError> {
     let mut named = Vec::new();
     let Some(section) = section else { return Ok(Named(named)) };
@@ -137,12 +137,12 @@ pub(crate) fn parse(section: Option<Section<'_>>, facts: &Facts) -> Result<Named
 }
 
 impl Named {
-    /// Whether an effect is among them.
+    /// Whether the effect of this name is among the effects.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.0.iter().any(|(kind, _)| kind.name() == name)
     }
 
-    /// Adds the effects of a text of tables, none of which may be present already.
+    /// Adds the effects of a text of tables. None of these effects may be present already.
     ///
     /// Errors: see [`EffectKind::read`].
     pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {

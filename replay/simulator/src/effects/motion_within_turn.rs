@@ -12,8 +12,8 @@ use crate::stages::{AIM_HELD, Stage, aim_moving};
 
 /// Heads look from the vehicle's pose at each ping.
 ///
-/// Without this effect, a turn is one picture from the pose at the turn's beginning, as in simulators that take a whole
-/// scan at once.
+/// Without this effect, all pings of a turn are from the pose at the turn's beginning, as in simulators that take a
+/// whole scan at once.
 pub(super) struct MotionWithinTurnKind;
 
 struct Moving;

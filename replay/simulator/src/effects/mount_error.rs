@@ -1,4 +1,4 @@
-//! Sensors aren't mounted as the vehicle file says.
+//! Differences of sensors' mounts from the vehicle file.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, Vec3};
@@ -14,9 +14,9 @@ use crate::sensing::Mounted;
 
 /// A sensor's true mount differs from that in the vehicle file, which the loop uses.
 ///
-/// `position_m` and `angles_deg` (roll, pitch and yaw, before those of the file) are added for all named sensors.
-/// `position_sd_m`, to 1, and `angles_sd_deg`, to 30, are the standard deviations of further errors, drawn for each
-/// axis and sensor. A head that occludes others is at its place in the file.
+/// `position_m` and `angles_deg` (roll, pitch and yaw, applied before the file's angles) are added to the mounts of all
+/// named sensors. `position_sd_m`, to 1, and `angles_sd_deg`, to 30, are the standard deviations of additional errors,
+/// which are drawn for each axis and sensor. When a head occludes others, its position is that of the file.
 pub(super) struct MountErrorKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -95,10 +95,10 @@ mod tests {
     use super::*;
     use crate::testing::Dive;
 
-    /// Compares with a head on the axis of a rectangle.
+    /// Compares ranges with those of a head on the axis of a rectangle.
     ///
-    /// With a mount rolled by an angle, a beam meets the wall like an unrolled beam at another angle. With a mount
-    /// moved sideways, the beam starts sideways.
+    /// If the mount is rolled by an angle, a beam meets the wall like an unrolled beam at another angle. If the mount
+    /// is moved sideways, the beam starts at the moved position.
     #[test]
     fn turned_and_moved_head_sees_walls_from_its_true_mount() {
         let dive = Dive::with_head();
@@ -107,7 +107,8 @@ mod tests {
         assert!(!dived.rows.is_empty());
         for row in &dived.rows {
             let sounding = row.sounding.unwrap();
-            // 0 is down, growing clockwise looking ahead; y is left, z up. The roll turns y towards z: left up.
+            // The head's angle is 0 straight down and grows clockwise, seen looking ahead; y is left, z up. The roll
+            // turns y towards z: left up.
             let turned_rad = sounding.measured.angle_rad + f64::to_radians(3.0);
             let (sine, cosine) = math::sin_cos(turned_rad);
             let (y, z) = (0.25 + row.pose.position.y(), 0.5 + row.pose.position.z());
@@ -120,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_have_their_spread_and_are_independent_per_sensor() {
+    fn draws_have_the_given_spread_and_are_independent_per_sensor() {
         let mut places = Vec::new();
         for seed in 0..200 {
             let dive = Dive { seed, seconds: 0.2, ..Dive::with_heads(&[[0.3, 0.0, 0.0], [-0.3, 0.0, 0.0]]) };
@@ -137,9 +138,10 @@ mod tests {
         assert!(pairs.abs() < 5e-4 / math::sqrt(n / 2.0), "{pairs}");
     }
 
-    /// Roll moves a beam perpendicular to the head's axis within its plane; pitch and yaw move it out of the plane.
+    /// Roll turns a beam that is perpendicular to the head's axis within its plane. Pitch and yaw turn it out of the
+    /// plane.
     #[test]
-    fn angles_have_their_spread_about_each_axis() {
+    fn angles_have_the_given_spread_about_each_axis() {
         let sd_rad = f64::to_radians(0.5);
         let (mut within, mut out) = (Vec::new(), Vec::new());
         for seed in 0..400 {
@@ -158,8 +160,8 @@ mod tests {
         }
     }
 
-    /// On a sensor that looks to the left, the sensor's x is the vehicle's y: a roll moves z backwards, a pitch moves x
-    /// down.
+    /// On a sensor that looks to the left, the sensor's x is the vehicle's y. A roll turns z backwards, and a pitch
+    /// turns x down.
     #[test]
     fn angle_errors_act_about_the_axes_of_the_sensor() {
         let left = Mount {

@@ -1,4 +1,4 @@
-//! Some echoes arrive by way of two walls.
+//! Echoes by way of two walls.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -18,21 +18,22 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Some echoes arrive by way of two walls: the first reflects the beam specularly, the second returns it to the sonar.
+/// Some echoes arrive by way of two walls. The first wall reflects the beam specularly, and the second one returns it
+/// to the sonar.
 ///
-/// The range is half of that path, (r1 + r12 + r2) / 2. It replaces the direct echo more often towards grazing
-/// incidence, since the direct echo's strength is proportional to the cosine of incidence.
+/// The range is half the length of this path, (r1 + r12 + r2) / 2. Such an echo replaces the direct echo more often
+/// towards grazing incidence, since the strength of the direct echo is proportional to the cosine of incidence.
 ///
 /// Keys:
 /// - `from_m` and `to_m` of the stretch in which this happens.
-/// - `square_share` (0) and `share` (0.1), the share of returns with the beam perpendicular to the wall and along it,
-///   both from 0 to 1; between, the share grows with 1 minus the cosine of incidence.
+/// - `square_share` (0) and `share` (0.1), the shares of returns for a beam perpendicular to the wall and for a beam
+///   along the wall, both from 0 to 1. In between, the share grows with 1 minus the cosine of incidence.
 ///
 /// The echo remains the direct one if the path meets no second wall within reach, or the sonar doesn't see that wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
 pub(super) struct MultipathKind;
 
-/// Distance off the wall at which reflected rays begin, m.
+/// Distance from the wall at which reflected rays begin, m.
 const OFF_WALL_M: f64 = 1e-6;
 
 #[derive(Debug, Clone, Copy)]
@@ -80,8 +81,7 @@ impl Effect for PerSensor<Places<Parameters>> {
     }
 }
 
-/// The range by way of two walls of a beam that has met the first wall, m; `None` if there is no such path within
-/// `far_m`.
+/// The range of a beam by way of two walls, m; `None` if there is no such path within `far_m`.
 fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f64> {
     let first = ray.hit?;
     let from = first.point + first.normal.scaled(OFF_WALL_M);
@@ -129,23 +129,24 @@ mod tests {
         Ray { origin, direction, hit: environment.cast(origin, direction, 100.0) }
     }
 
-    /// Unfolded at the walls that it meets, a reflected beam is a straight line through mirrored rooms.
+    /// If the room is mirrored at each wall that the beam meets, the reflected beam becomes a straight line through
+    /// mirrored rooms.
     #[test]
-    fn path_in_a_rectangle_leads_to_a_mirror_image() {
+    fn second_path_in_a_rectangle_matches_its_mirror_image() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
         let room = Environment::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
             let [dy, dz] = [ray.direction.y(), ray.direction.z()];
-            // Along the unfolded beam: crossings of the side walls, and of floor and ceiling.
+            // Distances along the unfolded beam at which it crosses the side walls, and floor and ceiling.
             let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
             let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
             let mut crossings =
                 [to_side, to_side + 2.0 * half_width_m / dy.abs(), to_flat, to_flat + height_m / dz.abs()];
             crossings.sort_by(f64::total_cmp);
             let along_m = crossings[1];
-            // The point there, folded back into the room.
+            // The second point of reflection, folded back into the room.
             let fold = |at: f64, period: f64| {
                 let at = math::wrap(at, 2.0 * period);
                 if at > period { 2.0 * period - at } else { at }
@@ -162,15 +163,17 @@ mod tests {
     fn second_path_in_a_circle_is_a_chord_with_equal_incidence() {
         let (radius_m, out_m) = (4.0, 1.5);
         let pipe = Environment::straight(shapes::circle(radius_m).unwrap());
-        // The circle rests on the floor: its centre is a radius above it.
+        // The circle rests on the floor, so its centre is a radius above the floor.
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&pipe, [out_m, radius_m], angle_rad);
-            // Sine of incidence by the law of sines; a chord's ends are seen from the centre under pi - 2 i.
+            // The sine of incidence follows from the law of sines. The ends of a chord are seen from the centre under
+            // the angle pi - 2 i.
             let incidence_rad = math::asin(out_m * ray.direction.z().abs() / radius_m);
             let chord_m = 2.0 * radius_m * math::cos(incidence_rad);
             let first_m = radius_m * math::cos(incidence_rad) - out_m * ray.direction.y();
-            // From the first point back along the beam and on at twice the incidence: law of cosines.
+            // The path from the second point back to the sonar follows from the law of cosines, with twice the
+            // incidence between beam and chord.
             let cosine = math::cos(2.0 * incidence_rad);
             let back_m = math::sqrt(first_m * first_m + chord_m * chord_m - 2.0 * first_m * chord_m * cosine);
             let found_m = double_bounce_m(&pipe, &ray, 100.0).unwrap();
@@ -182,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn the_share_grows_with_incidence() {
+    fn share_grows_with_incidence() {
         let dive = Dive {
             seconds: 500.0,
             tunnel: "profile = \"rectangle\"\nwidth_m = 4\nheight_m = 3",

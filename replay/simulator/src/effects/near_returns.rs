@@ -1,4 +1,4 @@
-//! Returns from objects before the wall, in clusters.
+//! Returns from objects in front of the wall, in clusters.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -16,9 +16,9 @@ use crate::random::Stream;
 use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Bubbles, clouds of silt or weed before the wall return the sound.
+/// Bubbles, clouds of silt or weed in front of the wall return the sound.
 ///
-/// Consecutive pings hit the same cluster and return about the same range; the next cluster is elsewhere. Keys:
+/// Consecutive pings hit the same cluster and return about the same range. The next cluster has another range. Keys:
 /// - `from_m` and `to_m` of the stretch in which this happens.
 /// - the `share` of pings, from 0 (excluded) to 0.95, and the mean length of their runs, `mean_run` pings, as in
 ///   missing_returns.
@@ -42,10 +42,10 @@ struct NearReturns {
     cluster: Cluster,
 }
 
-/// The current cluster.
+/// The current cluster, and whether the last ping hit it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cluster {
-    /// Whether the last ping hit one; `None` before the first.
+    /// Whether the last ping hit a cluster; `None` before the first ping.
     met: Option<bool>,
     range_m: f64,
 }
@@ -87,7 +87,8 @@ impl Effect for PerSensor<Places<Parameters>> {
 }
 
 impl Parameters {
-    /// The range of the cluster that a step's ping hits, m. Call once per step, in order.
+    /// The range of the cluster that the ping of a step hits, m; `None` if it hits none. Must be called once per step,
+    /// in order.
     fn met_m(&self, cluster: &mut Cluster, stream: Stream, step: u64) -> Option<f64> {
         let [chance, place] = stream.at(step).uniform();
         let meets = self.runs.next(cluster.met, chance);
@@ -127,7 +128,7 @@ mod tests {
 
     use crate::testing::Dive;
 
-    /// Soundings with near returns. The nearest walls are 2.5 m away.
+    /// The near returns by ping; `None` for pings without one. The nearest walls are 2.5 m away.
     fn near(keys: &str) -> Vec<Option<f64>> {
         let dive = Dive { seconds: 2000.0, ..Dive::with_head() };
         let (base, with) = (dive.dive(""), dive.dive(&format!("[effects.near_returns]\n{keys}")));
@@ -135,9 +136,9 @@ mod tests {
         pairs.map(|(was, is)| is.filter(|_| was != is)).collect()
     }
 
-    /// Pings of a run share one range, with its spread; the next run has another range.
+    /// The pings of a run share one range, with the given spread. The next run has another range.
     #[test]
-    fn clusters_have_their_share_runs_and_spread() {
+    fn clusters_have_the_given_share_run_length_and_spread() {
         let (share, mean) = (0.1, 6.0);
         let near = near("share = 0.1\nmean_run = 6\nnear_m = 0.8\nfar_m = 2\nspread_m = 0.05");
         let runs: Vec<Vec<f64>> = near
@@ -153,8 +154,8 @@ mod tests {
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         assert!((pings / whole - share).abs() < 5.0 * math::sqrt(variance), "{}", pings / whole);
 
-        // Within a run the variance is that of the spread. That of runs' means is that of even places, and a little
-        // more.
+        // Within a run, the variance is that of the spread. The variance of the runs' means is that of evenly
+        // distributed ranges, and a little more.
         let long: Vec<&Vec<f64>> = runs.iter().filter(|run| run.len() > 1).collect();
         let (mut within, mut freedom, mut means) = (0.0, 0.0, Vec::new());
         for run in &long {
@@ -171,25 +172,28 @@ mod tests {
         assert!((spread / 0.12 - 1.0).abs() < 5.0 * math::sqrt(0.8 / n) + 0.02, "{spread}");
     }
 
-    /// The wall is 3 m away, so half of the clusters from 2 to 4 m are before it. With no wall in reach, all are heard.
+    /// The wall is 3 m away, so half of the clusters from 2 to 4 m are in front of the wall. A ping that the sonar
+    /// loses has no return, even if it hit a cluster.
     #[test]
-    fn clusters_beyond_the_wall_are_silent_and_pings_without_wall_get_returns() {
+    fn clusters_beyond_the_wall_are_not_heard_and_lost_pings_stay_lost() {
         let dive = Dive { seconds: 400.0, ..Dive::with_sounder() };
         let keys = "[effects.near_returns]\nshare = 0.4\nnear_m = 2\nfar_m = 4\nspread_m = 0\n";
         let (base, with) = (dive.dive("").ranges_m(0), dive.dive(keys).ranges_m(0));
         let wall_m = base[0].unwrap();
         assert!(with.iter().all(|range_m| range_m.unwrap() <= wall_m));
         let nearer = with.iter().filter(|range_m| range_m.unwrap() < wall_m).count();
-        // Single pings have 1 / (1 - share) pings per run, which share their fate.
+        // The pings of a run hit the same cluster. A run has 1 / (1 - share) pings on average, which increases the
+        // spread.
         let share = 0.4 * (wall_m - 2.0) / 2.0;
         let sd = math::sqrt(share * (1.0 - share) / base.len() as f64 * 2.0 / (1.0 - 0.4));
         assert!((nearer as f64 / base.len() as f64 - share).abs() < 5.0 * sd, "{nearer} of {}", base.len());
         let deaf = format!("[effects.missing_returns]\nfar_from_m = 1\nfar_to_m = 1\n{keys}");
         let heard = dive.dive(&deaf).ranges_m(0).iter().filter(|range_m| range_m.is_some()).count();
-        assert_eq!(heard, 0, "what is lost in the sonar is lost wherever it came from");
+        assert_eq!(heard, 0, "a ping that the sonar loses has no range");
     }
 
-    /// Two stretches with a gap. Nearly every ping hits a cluster, and the first stretch's cluster must end with it.
+    /// There are two stretches with a gap between them. Nearly every ping hits a cluster, and the first stretch's
+    /// cluster must end with the stretch.
     #[test]
     fn cluster_ends_with_its_stretch() {
         let dive = Dive { seconds: 60.0, ..Dive::with_head() };

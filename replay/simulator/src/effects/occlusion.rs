@@ -1,4 +1,4 @@
-//! Parts of the vehicle occlude beams.
+//! Occlusion of beams by parts of the vehicle.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -15,18 +15,17 @@ use crate::facts::Facts;
 use crate::sensing::{Echosounder, Mounted, Samples};
 use crate::stages::Stage;
 
-/// Parts of the vehicle occlude beams: other heads' bodies, the hull's boxes and the tether return an echo instead of
-/// the wall.
+/// Parts of the vehicle occlude beams. Bodies of other heads, boxes of the hull and the tether return an echo instead
+/// of the wall.
 ///
-/// Below the sonar's least range there is no return. Keys:
-/// - whether `heads` (true), `hull` (true) and `tether` (false) occlude.
-/// - for the tether, a straight piece: `tether_from_m`, its start in the body's frame (needed); `tether_towards`, its
-///   direction ([-1, 0, 0]: aft); `tether_length_m`, from 0.1 to 500 (20); `tether_radius_m`, from 0.001 to 0.1
-///   (0.006).
+/// If the part is nearer than the sonar's least range, there is no return. Keys:
+/// - `heads` (true), `hull` (true) and `tether` (false): whether these occlude beams.
+/// - for the tether, which is a straight cylinder: `tether_from_m`, its start in the body's frame (required);
+///   `tether_towards`, its direction ([-1, 0, 0], aft); `tether_length_m`, from 0.1 to 500 (20); `tether_radius_m`,
+///   from 0.001 to 0.1 (0.006).
 ///
-/// Only the beam's axis is tested. A wide beam is therefore hidden for the same angle as a narrow one, and not
-/// gradually. A head isn't hidden by a body that contains it, so idealised heads in one place don't hide anything from
-/// each other.
+/// Only the beam's axis is tested. A wide beam is therefore occluded over the same angle as a narrow one, and not
+/// gradually. A body doesn't occlude a head inside it, so idealised heads in one place don't occlude each other.
 ///
 /// Source: core/sampling/src/occlusion.rs, which plans with the same bodies.
 pub(super) struct OcclusionKind;
@@ -43,7 +42,7 @@ struct Occlusion {
     obstacles: Vec<Obstacle>,
 }
 
-/// For each of the slice's beams, whether the vehicle stops it before the wall; used by later effects.
+/// For each beam of the slice, whether a part of the vehicle stops the beam before the wall. Later effects use this.
 #[derive(Debug, Clone, Default, Component)]
 pub(super) struct Stopped(Vec<bool>);
 
@@ -113,7 +112,7 @@ impl Effect for PerSensor<Parameters> {
 }
 
 impl Parameters {
-    /// Obstacles that may occlude a sonar.
+    /// Parts of the vehicle that may occlude a sonar.
     fn obstacles(&self, source: usize, facts: &Facts) -> Vec<Obstacle> {
         let others = facts.sensors.iter().enumerate().filter(|(other, _)| self.heads && *other != source);
         let bodies = others.filter_map(|(_, sensor)| sensor.head.as_ref().map(Obstacle::of_head));
@@ -169,10 +168,10 @@ mod tests {
         let half_rad = math::asin(radius_m / 0.3);
         let mut hidden = 0;
         for ((angle_rad, range_m), wall_m) in dived.soundings(0).into_iter().zip(base.ranges_m(0)) {
-            // The neighbour is to the right, at 270 degrees.
+            // The neighbour is to the right of the head, at 270 degrees.
             let off_rad = math::wrap_signed(angle_rad - 1.5 * math::PI, math::TAU);
             if off_rad.abs() < half_rad {
-                // First point of a circle of that radius at 0.3 m.
+                // Nearest point on a circle of this radius, whose centre is 0.3 m away.
                 let across_m = 0.3 * math::sin(off_rad);
                 let depth_m = math::sqrt(radius_m * radius_m - across_m * across_m);
                 let near_m = 0.3 * math::cos(off_rad) - depth_m;
@@ -213,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echosounder_is_hidden_along_its_own_axis() {
+    fn echosounder_is_occluded_along_its_own_axis() {
         let mut dive = Dive::with_sounder();
         dive.vehicle = "[[hull]]\nleast_m = [-1, 0.4, -1]\nmost_m = [1, 0.8, 1]";
         let ranges_m = dive.dive("[effects.occlusion]").ranges_m(0);

@@ -1,4 +1,4 @@
-//! Some returns are unrelated to the wall.
+//! Returns that are unrelated to the wall.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -15,7 +15,7 @@ use crate::random::Stream;
 use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Some returns are unrelated to the wall: their range is uniformly distributed.
+/// Some returns are unrelated to the wall. Their range is uniformly distributed.
 ///
 /// Echosounders in a tunnel give such outliers between echoes of all kinds. Keys:
 /// - `from_m` and `to_m` of the stretch in which they occur.
@@ -43,7 +43,7 @@ struct Outliers {
     stream: Stream,
 }
 
-/// Outliers in a stretch: their share, and the ranges between which they lie, m.
+/// Outliers in a stretch: their share of the returns, and the limits of their ranges, m.
 #[derive(Debug, Clone, Copy)]
 struct Strays {
     share: f64,
@@ -118,7 +118,7 @@ mod tests {
     use crate::testing::{Dive, assert_share};
 
     #[test]
-    fn outliers_have_their_share_and_spread() {
+    fn outliers_have_the_given_share_and_spread() {
         let dive = Dive { seconds: 1000.0, ..Dive::with_sounder() };
         let (base, dived) = (dive.dive(""), dive.dive("[effects.outliers]\nshare = 0.2\nfar_m = 20.3"));
         let pairs = || base.ranges_m(0).into_iter().zip(dived.ranges_m(0));
@@ -132,7 +132,7 @@ mod tests {
         assert!(least >= 0.3 && most <= 20.3 && most - least > 19.9);
         let mean_m = strays.iter().sum::<f64>() / count;
         let variance_m2 = strays.iter().map(|m| (m - mean_m) * (m - mean_m)).sum::<f64>() / count;
-        // A uniform distribution over 20 m: variance 400 / 12, fourth moment 20^4 / 80.
+        // For a uniform distribution over 20 m, the variance is 400 / 12 and the fourth moment 20^4 / 80.
         assert!((mean_m - 10.3).abs() < 5.0 * math::sqrt(400.0 / 12.0 / count));
         let kurtosis_m4 = 160_000.0 / 80.0 - (400.0 / 12.0) * (400.0 / 12.0);
         assert!((variance_m2 - 400.0 / 12.0).abs() < 5.0 * math::sqrt(kurtosis_m4 / count));

@@ -1,4 +1,4 @@
-//! The vehicle drifts about its trajectory.
+//! Drift of the vehicle about its trajectory.
 
 use headrace_config::{ConfigError, Section};
 
@@ -12,9 +12,9 @@ use crate::trajectory::{Offsets, wandering};
 /// The vehicle drifts left and right, up and down, and turns, as under a pilot.
 ///
 /// Each component varies smoothly and independently within its reach: `across_m`, `up_m`, `roll_deg`, `pitch_deg`,
-/// `yaw_deg`. Standard deviations are 0.4 of the reaches. `period_s` (30 by default) is the period of the drift:
-/// control points of a cubic B-spline are half of it apart. Source: Jorge et al. 2021, §8.1 (the pilot can drift 1.5 m
-/// vertically and horizontally, the heading 15 degrees).
+/// `yaw_deg`. The standard deviation of a component is 0.4 of its reach. `period_s` (30 by default) is the period of
+/// the drift. The control points of a cubic B-spline are half a period apart. Source: Jorge et al. 2021, §8.1 (the
+/// pilot can drift 1.5 m vertically and horizontally, the heading 15 degrees).
 pub(super) struct PilotDriftKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -92,7 +92,7 @@ mod tests {
         }
         for (axis, sum) in squares.into_iter().enumerate() {
             let sd = math::sqrt(sum / count);
-            // Based on about 320 independent stretches.
+            // The tolerance allows for about 320 independent stretches.
             assert!((sd - 0.4 * reach[axis]).abs() <= 0.1 * reach[axis], "{axis}: {sd}");
         }
     }

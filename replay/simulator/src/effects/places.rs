@@ -8,16 +8,16 @@ use crate::facts::Facts;
 use crate::sensing::{Ray, Scenery};
 use crate::stretch::Stretch;
 
-/// The parameters of an effect on one sensor, by the stretches in which they apply.
+/// The parameters of an effect on one sensor, each with the stretches in which they apply.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Places<P>(Vec<(Stretch, P)>);
 
 impl<P: Clone> PerSensor<Places<P>> {
     /// Reads tables like [`PerSensor::read`], each limited to the stretch from `from_m` to `to_m`.
     ///
-    /// A sensor may have several stretches that don't overlap.
+    /// A sensor may have several stretches if they don't overlap.
     ///
-    /// Errors: those of [`PerSensor::read`]; overlapping stretches of one sensor.
+    /// Errors: those of [`PerSensor::read`]; stretches of one sensor overlap.
     pub(super) fn read_by_place(
         tables: Vec<Section<'_>>,
         facts: &Facts,
@@ -56,9 +56,9 @@ impl<P: Clone> PerSensor<Places<P>> {
 }
 
 impl<P> Places<P> {
-    /// The parameters at the position of a sonar with beam `ray`, if the effect acts there.
+    /// The parameters at the origin of a sonar's beam `ray`, if the effect acts there.
     ///
-    /// An effect in the whole tunnel doesn't need the position.
+    /// For an effect in the whole tunnel, the position isn't computed.
     pub(super) fn here(&self, scenery: &Scenery, ray: &Ray) -> Option<&P> {
         self.at(|| {
             let [chainage_m, ..] = scenery.environment.axis().chart(ray.origin);
@@ -75,7 +75,7 @@ impl<P> Places<P> {
         self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)).map(|(_, parameters)| parameters)
     }
 
-    /// The same stretches with other parameters.
+    /// Returns the same stretches with converted parameters.
     pub(super) fn map<Q>(&self, mut how: impl FnMut(&P) -> Q) -> Places<Q> {
         Places(self.0.iter().map(|(stretch, parameters)| (*stretch, how(parameters))).collect())
     }
@@ -91,8 +91,8 @@ mod tests {
     use crate::TruthRow;
     use crate::testing::{Dive, assert_share};
 
-    /// Chainages of soundings, and whether the effects changed them. The sonar is at the vehicle's middle, so its
-    /// chainage is the truth's.
+    /// Chainages of soundings, and whether the effects changed the soundings. The sonar is at the vehicle's middle, so
+    /// its chainage is the vehicle's true chainage.
     fn touched(effects: &str) -> Vec<(f64, bool)> {
         let dive = Dive { seconds: 100.0, ..Dive::with_head() };
         let range_m = |row: &TruthRow| row.sounding.and_then(|sounding| sounding.measured.range_m);
@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// A step draws the same numbers in a stretch as in the whole tunnel.
+    /// A step draws the same random numbers in a stretch as in the whole tunnel.
     #[test]
     fn stretches_that_cover_the_tunnel_equal_the_whole_tunnel() {
         let dive = Dive { seconds: 40.0, ..Dive::with_head() };

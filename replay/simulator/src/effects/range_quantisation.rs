@@ -15,12 +15,12 @@ use crate::facts::Facts;
 use crate::sensing::{Head, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Ranges are rounded to steps, as if read off an echo with a limited number of points.
+/// Ranges are rounded to steps, as if read from an echo with a limited number of points.
 ///
-/// Keys, at most one of them:
-/// - `quantum_m`, the step in metres as the device computes them (a head at 1500 m/s; an echosounder in metres of
-///   water), from 0.0005 to 1.
-/// - `points` over a head's range setting, from 50 to 10,000 (500).
+/// Keys, of which at most one is allowed:
+/// - `quantum_m`, the step in metres as the device computes them, from 0.0005 to 1. A head computes with 1500 m/s, an
+///   echosounder in metres of water.
+/// - `points`, the number of steps over a head's range setting, from 50 to 10,000 (500).
 ///
 /// Steps are in the device's own metres because the device measures time. Its wire format adds its own step. Source:
 /// Jorge et al. 2021, §6 (eta) and §9.2 (500 points over 10 m: 0.02 m).
@@ -77,7 +77,7 @@ impl Effect for PerSensor<Step> {
 }
 
 impl Step {
-    /// The step in metres of water.
+    /// The step, converted to metres of water.
     fn in_water_m(self, head: Option<&Head>, sound_speed_mps: f64) -> f64 {
         let water_per_device = head.map_or(1.0, |Head(spec)| sound_speed_mps / spec.sound_speed_mps);
         let quantum_m = match self {

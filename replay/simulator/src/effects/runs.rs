@@ -1,31 +1,31 @@
-//! Selects pings singly or in runs.
+//! Selects pings, either singly or in runs.
 
 use headrace_config::{ConfigError, Section};
 
-/// Largest mean run, pings.
+/// Largest allowed mean length of a run, pings.
 const LONGEST_RUN: f64 = 10_000.0;
 
-/// A Markov chain of two states.
+/// A Markov chain with two states: in a run, and not in a run.
 ///
 /// Source: Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39, 1960.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Runs {
     share: f64,
-    /// Probability that a run begins with a ping.
+    /// Probability that a run begins with the next ping.
     begin: f64,
     /// Probability that a run continues with the next ping.
     go_on: f64,
 }
 
 impl Runs {
-    /// The chain whose runs, of mean length `mean`, contain this share of the pings.
+    /// Creates the chain in which runs of mean length `mean` contain this share of the pings.
     pub(super) fn new(share: f64, mean: f64) -> Self {
         Self { share, begin: share / (mean * (1.0 - share)), go_on: 1.0 - 1.0 / mean }
     }
 
     /// Reads `share` and `mean_run`; `None` for a share of zero, which is the default.
     ///
-    /// Errors: one is out of range; the mean is too small for the share.
+    /// Errors: a value is out of range, or the mean is too small for the share.
     pub(super) fn read(table: &Section<'_>) -> Result<Option<Self>, ConfigError> {
         let share = table.number("share", 0.0..=0.95)?.unwrap_or(0.0);
         let mean = table.number("mean_run", 1.0..=LONGEST_RUN)?;
@@ -38,15 +38,15 @@ impl Runs {
         let least = share / (1.0 - share);
         if mean.is_some_and(|mean| mean < least) {
             let problem =
-                format!("must be at least {least:.2}: shorter runs don't make up a share of {share}");
+                format!("must be at least {least:.2}: shorter runs cannot make up a share of {share}");
             return Err(table.invalid("mean_run", &problem));
         }
         Ok(Some(Self::new(share, mean.unwrap_or(1.0 / (1.0 - share)))))
     }
 
-    /// State of the next ping from that of the last one and a number between 0 and 1.
+    /// State of the next ping, from the state of the last ping and a random number between 0 and 1.
     ///
-    /// The first ping is in a run with the probability of the share.
+    /// The probability that the first ping is in a run equals the share.
     pub(super) fn next(&self, before: Option<bool>, chance: f64) -> bool {
         let in_run = match before {
             None => self.share,

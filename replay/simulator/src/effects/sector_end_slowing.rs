@@ -1,4 +1,4 @@
-//! Heads slow down at the ends of their sectors.
+//! Slowing of heads at the ends of their sectors.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -18,10 +18,10 @@ use crate::stages::Stage;
 
 /// A head in a sector follows its commands with a first-order lag and reports its true angle.
 ///
-/// It slows down at the ends, where steps are short: the paper's false minima. Heads that turn continuously are
-/// unchanged. `lag_ms` is the time constant, 100 by default. The command is taken to change linearly between two pings,
-/// for which the lag is exact. The head begins at rest. Source: Jorge et al. 2021, §8.1 (sensors "decreasing speed due
-/// to the control system of the head").
+/// The head slows down at the ends. The steps there are short, which gives the paper's false minima. Heads that turn
+/// continuously are unchanged. `lag_ms` is the time constant, 100 by default. The command is assumed to change linearly
+/// between two pings; for such a command the lag is exact. The head begins at rest. Source: Jorge et al. 2021, §8.1
+/// (sensors "decreasing speed due to the control system of the head").
 pub(super) struct SectorEndSlowingKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +33,7 @@ struct Parameters {
 struct SectorEndSlowing {
     lag_s: f64,
     commanded: Option<(MonoNs, f64)>,
-    /// Lag of the head behind its command.
+    /// Lag of the head behind its command, radians.
     behind_rad: f64,
 }
 
@@ -111,9 +111,9 @@ mod tests {
     const KEYS: &str = "[effects.sector_end_slowing]\nlag_ms = 150\n";
     const LAG_S: f64 = 0.15;
 
-    /// For a command that grows linearly from rest: c(t) = w t, y = w (t - T + T exp(-t / T)).
+    /// For a command c(t) = w t that grows from rest, the response is y = w (t - T + T exp(-t / T)).
     #[test]
-    fn the_lag_has_its_closed_form() {
+    fn lag_matches_its_closed_form() {
         let (plain, slowed) = (pings(""), pings(KEYS));
         let first_rad = turned(&plain[0], &plain[1]);
         let rate_radps = first_rad / between_s(&plain[0], &plain[1]);
@@ -127,8 +127,8 @@ mod tests {
         }
     }
 
-    /// Long after the previous reversal, the head moves at w (2 exp(-t / T) - 1) after a reversal, so it turns round T
-    /// ln 2 later.
+    /// Long after the previous reversal, the head moves at w (2 exp(-t / T) - 1) after a reversal of the command. The
+    /// head itself therefore reverses T ln 2 later.
     #[test]
     fn steps_are_short_at_reversals_and_whole_between() {
         let (plain, slowed) = (pings(""), pings(KEYS));

@@ -1,4 +1,4 @@
-//! Echoes through side lobes.
+//! Echoes heard through side lobes.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -20,22 +20,22 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Some ranges are those of side lobes that meet the wall nearer and more perpendicularly than the beam.
+/// Some ranges come from side lobes that meet the wall nearer and more perpendicularly than the beam.
 ///
-/// There are four side lobes, two in the plane of turning and two across it. The nearest such lobe's range is reported
-/// with some probability. Keys:
+/// There are four side lobes, two in the plane of turning and two across that plane. The range of the nearest such lobe
+/// is reported with some probability. Keys:
 /// - `from_m` and `to_m` of the stretch in which this happens.
 /// - their `angle_deg` from the beam's axis, from 0.1 to 80 (1.59 times the beam's width).
 /// - the probability `share`, from 0 (excluded) to 1 (0.05).
 ///
 /// Source: the first side lobe of a circular piston, ka sin x = 5.136 against 1.616 at half power (Urick, "Principles
-/// of underwater sound", ch. 3). It is 17.6 dB below the beam, so it matters where the wall reflects the beam itself
-/// away.
+/// of underwater sound", ch. 3). The side lobe is 17.6 dB weaker than the beam, so it matters where the wall reflects
+/// the beam itself away.
 pub(super) struct SideLobesKind;
 
 /// Angle from the beam's axis to the first side lobe, in full widths of the beam.
 const LOBE_WIDTHS: f64 = 5.136 / 1.616 / 2.0;
-/// Full width of an echosounder's beam, degrees; see the beam_cone effect.
+/// Full width of an echosounder's beam, degrees; see the effect beam_cone.
 const ECHOSOUNDER_DEG: f64 = 30.0;
 
 #[derive(Debug, Clone, Copy)]
@@ -50,7 +50,7 @@ struct SideLobes {
     stream: Stream,
 }
 
-/// Side lobes in a stretch: their angle from the beam's axis, and the share of the pings that hear them.
+/// Side lobes in a stretch: their angle from the beam's axis, and the share of pings in which they are heard.
 #[derive(Debug, Clone, Copy)]
 struct Lobes {
     angle_rad: f64,
@@ -95,7 +95,8 @@ impl Effect for PerSensor<Places<Parameters>> {
     }
 }
 
-/// Range of the nearest lobe that meets a wall nearer than `near_m` and more perpendicularly than the beam's axis, m.
+/// Range of the nearest side lobe that meets the wall nearer than `near_m` and more perpendicularly than the beam's
+/// axis, m.
 fn lobe_m(environment: &Environment, ray: &Ray, angle_rad: f64, near_m: f64) -> Option<f64> {
     let least = ray.hit.map_or(0.0, |hit| squareness(ray.direction, hit.normal));
     let (sine, cosine) = math::sin_cos(angle_rad);
@@ -141,7 +142,8 @@ mod tests {
             dive.dive(effects).soundings(0).into_iter().zip(dive.dive("").ranges_m(0))
         {
             let (range_m, was_m) = (range_m.unwrap(), was.unwrap());
-            // Beams that meet the floor within 50 degrees of the perpendicular; their lobes, within 42.
+            // The floor is hit by beams within 50 degrees of the perpendicular, and by all lobes of beams within 42
+            // degrees.
             let off_rad = math::wrap_signed(angle_rad, math::TAU).abs();
             if off_rad.to_degrees() < 42.0 {
                 // A lobe nearer to the perpendicular than the beam has the shorter range and the smaller incidence.

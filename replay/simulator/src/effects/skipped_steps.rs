@@ -1,4 +1,4 @@
-//! Heads miss some of the commanded steps.
+//! Skipped steps of heads.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -16,11 +16,11 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// From time to time a head misses a commanded step and lags by that step from then on, since hosts command steps, not
-/// angles.
+/// From time to time a head misses a commanded step. From then on it lags by that step, since hosts command steps and
+/// not angles.
 ///
-/// `per_thousand` steps are missed, each independently. With `told` the head reports its true angle; without, as is the
-/// default, the commanded one.
+/// Of a thousand steps, `per_thousand` are missed, each independently. If `told` is true, the head reports its true
+/// angle; otherwise, as by default, it reports the commanded angle.
 pub(super) struct SkippedStepsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -84,7 +84,7 @@ mod tests {
     use crate::testing_motion::{Bench, refusal, same_in_any_slices};
 
     #[test]
-    fn skipped_steps_have_their_rate_and_are_never_made_up() {
+    fn skipped_steps_have_the_given_rate_and_are_never_made_up() {
         let plain: Vec<Sounding> = Bench::long("").run("head_a");
         let step_rad = plain[1].angle_rad - plain[0].angle_rad;
         for told in [false, true] {

@@ -1,4 +1,4 @@
-//! The true speed of sound differs from the vehicle file's.
+//! Error of the configured speed of sound.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -16,8 +16,8 @@ use crate::stages::Stage;
 /// The true speed of sound differs from the vehicle file's.
 ///
 /// Echoes come earlier or later. Reported ranges, which are computed with the file's speed, are scaled by file / true.
-/// Keys, one of them: `true_mps`, the true speed, from 1300 to 1700 m/s; `share`, its relative excess over the file's,
-/// from -0.1 to 0.1.
+/// One of two keys is required: `true_mps`, the true speed, from 1300 to 1700 m/s; or `share`, the relative excess of
+/// the true speed over the file's, from -0.1 to 0.1.
 pub(super) struct SoundSpeedErrorKind;
 
 #[derive(Debug, Clone, Copy)]

@@ -1,4 +1,4 @@
-//! The speed of sound changes with height.
+//! Speed of sound that changes with height.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -18,13 +18,13 @@ use crate::stages::Stage;
 /// The speed of sound changes linearly with the height above the tunnel's floor, as in water with warm layers above
 /// cold.
 ///
-/// Ranges are computed with the vehicle file's speed, so they are off by the mean slowness along the path. Keys,
-/// besides `from_m` and `to_m` of the stretch: the speed at the floor, `floor_mps`, from 1300 to 1700 (the file's), and
-/// its change per metre of height, `per_metre_mps`, from -50 to 50 (0). One degree is about 4 m/s.
+/// Devices compute ranges with the vehicle file's speed. The error of a range depends on the mean slowness along the
+/// path. Keys, besides `from_m` and `to_m` of the stretch: the speed at the floor, `floor_mps`, from 1300 to 1700 (the
+/// file's), and its change per metre of height, `per_metre_mps`, from -50 to 50 (0). One degree is about 4 m/s.
 ///
-/// Bending of the ray isn't simulated. Its radius is the speed divided by the gradient, 300 m at 5 m/s per metre, which
-/// bends it by 2 degrees over 10 m of range. Source: Urick, "Principles of underwater sound", ch. 5 (travel time in a
-/// constant gradient).
+/// Bending of the ray isn't simulated. The ray's radius of curvature is the speed divided by the gradient: 300 m at 5
+/// m/s per metre, or 2 degrees over 10 m of range. Source: Urick, "Principles of underwater sound", ch. 5 (travel time
+/// in a constant gradient).
 pub(super) struct SoundSpeedProfileKind;
 
 /// Relative differences of speed below this count as zero.
@@ -34,7 +34,7 @@ const SAME: f64 = 1e-9;
 struct Parameters {
     floor_mps: f64,
     per_metre_mps: f64,
-    /// The vehicle file's speed.
+    /// The vehicle file's speed of sound, m/s.
     assumed_mps: f64,
 }
 
@@ -80,7 +80,7 @@ impl Effect for PerSensor<Places<Parameters>> {
 impl Parameters {
     /// Ratio of reported to true range for an echo from one height to another.
     fn scale(&self, from_z_m: f64, to_z_m: f64) -> f64 {
-        // The speed never falls below a third of the floor's, however deep a hollow is.
+        // The speed is never less than a third of the speed at the floor, however deep a hollow is.
         let at_mps = |z_m: f64| (self.floor_mps + self.per_metre_mps * z_m).max(self.floor_mps / 3.0);
         let [from_mps, to_mps] = [from_z_m, to_z_m].map(at_mps);
         let faster = to_mps / from_mps - 1.0;
@@ -109,9 +109,9 @@ mod tests {
     use super::*;
     use crate::testing::Dive;
 
-    /// Compares with the travel time summed over ten thousand pieces of the path.
+    /// Compares the ranges with the travel time summed over ten thousand pieces of the path.
     #[test]
-    fn ranges_are_travel_time_times_the_speed_of_the_file() {
+    fn reported_ranges_are_travel_time_times_the_configured_speed() {
         let mut dive = Dive::with_head();
         dive.vehicle = "[water]\nsound_speed_mps = 1447";
         for (keys, floor_mps, per_metre) in [
@@ -135,10 +135,10 @@ mod tests {
         }
     }
 
-    /// Forty metres up a gradient of -50 m/s per metre no speed is left. The mean slowness counts down to a third of
-    /// the floor's speed.
+    /// At a gradient of -50 m/s per metre, the speed is zero about thirty metres up. The mean slowness is computed with
+    /// at least a third of the speed at the floor.
     #[test]
-    fn sound_never_slows_below_a_third() {
+    fn speed_of_sound_never_falls_below_a_third_of_the_floor_value() {
         let profile = Parameters { floor_mps: 1440.0, per_metre_mps: -50.0, assumed_mps: 1440.0 };
         let expected = 1.5 * math::ln(3.0);
         for height_m in [20.0, 40.0, 400.0] {

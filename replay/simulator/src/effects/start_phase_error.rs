@@ -1,4 +1,4 @@
-//! Heads start at another phase than planned.
+//! Errors of the heads' start phases.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
@@ -15,11 +15,11 @@ use crate::random::Stream;
 
 /// Each head starts off its program's phase and reports its true angle.
 ///
-/// A head that turns continuously starts at another angle. A head in a sector keeps its sector and starts elsewhere in
-/// its sweep. `max_deg` draws the angle evenly within this much either way; `sd_deg` draws it normally; `offsets_deg`
-/// gives the angles, one for each head of the table, in order. Without any of them, `max_deg` is 180. In a sector the
-/// angle is a fraction of the sweep: 360 degrees are once there and back. Source: Jorge et al. 2021, §8.2 (Figure 12,
-/// without alignment).
+/// A head that turns continuously starts at another angle. A head in a sector keeps its sector and starts at another
+/// point of its sweep. With `max_deg`, the angle is drawn evenly up to this value either way. With `sd_deg`, it is
+/// drawn normally. `offsets_deg` gives the angles, one for each head of the table, in order. Without any of these keys,
+/// `max_deg` is 180. In a sector the angle is a fraction of the sweep: 360 degrees are one sweep there and back.
+/// Source: Jorge et al. 2021, §8.2 (Figure 12, without alignment).
 pub(super) struct StartPhaseErrorKind;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -86,13 +86,14 @@ impl Effect for PerSensor<Offset> {
     }
 }
 
-/// A program shifted by `off_rad`. In a sector, the shift is that fraction of a whole sweep there and back.
+/// Returns the program, shifted by `off_rad`. In a sector, the shift is the fraction `off_rad` / 2 pi of a sweep there
+/// and back.
 fn begun_off(program: HeadProgram, off_rad: f64) -> HeadProgram {
     let Some((least_rad, size_rad)) = program.sector else {
         return HeadProgram { start_rad: program.start_rad + off_rad, ..program };
     };
     let above_rad = program.start_rad - least_rad;
-    // Position in the sweep: up to `size_rad` upwards, and then back.
+    // Position in the sweep: up to `size_rad` the head moves upwards, and then back.
     let along_rad = if program.growing { above_rad } else { 2.0 * size_rad - above_rad };
     let along_rad = math::wrap(along_rad + off_rad / TAU * 2.0 * size_rad, 2.0 * size_rad);
     let growing = along_rad < size_rad;
@@ -117,7 +118,7 @@ mod tests {
                 (Bench::turning("").run::<Sounding>(head), Bench::turning(&keys).run::<Sounding>(head));
             assert_eq!(plain.len(), off.len());
             for (plain, off) in plain.iter().zip(&off) {
-                // Heads have steps of 0.3 degrees.
+                // Heads have steps of 0.3 degrees, so an angle is rounded by up to half a step.
                 let by_rad = off.angle_rad - plain.angle_rad - off_deg.to_radians();
                 assert!(math::wrap_signed(by_rad, TAU).abs() < f64::to_radians(0.150_1));
                 assert_eq!(off.angle_rad.to_bits(), off.reported_rad.to_bits());

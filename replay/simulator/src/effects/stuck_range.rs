@@ -1,4 +1,4 @@
-//! A sonar reports one range, whatever its beam meets.
+//! A sonar that reports a constant range.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -15,10 +15,11 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// A sonar reports one range, whatever its beam meets: its own frame, or a bubble before the transducer.
+/// A sonar reports a constant range, whatever its beam meets. Possible causes are the sonar's own frame, or a bubble in
+/// front of the transducer.
 ///
-/// Keys: the range `range_m` (0.55), from 0.01 to 200 m; the time from the dive's start at which it begins, `from_s`
-/// (0), and ends, `to_s` (never), in seconds. Source: a head in its frame reported 0.55 m throughout a whole dive.
+/// Keys: the range `range_m` (0.55), from 0.01 to 200 m; the start `from_s` (0) and the end `to_s` (never), in seconds
+/// from the dive's start. Source: a head in its frame reported 0.55 m throughout a whole dive.
 pub(super) struct StuckRangeKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -83,7 +84,7 @@ mod tests {
     use crate::testing::Dive;
 
     #[test]
-    fn range_is_constant_between_the_times_and_that_of_the_wall_otherwise() {
+    fn stuck_range_is_constant_within_its_times_and_true_otherwise() {
         let dive = Dive { seconds: 30.0, ..Dive::with_head() };
         let effect = "[effects.stuck_range]\nrange_m = 0.7\nfrom_s = 10\nto_s = 20";
         let (base, dived) = (dive.dive(""), dive.dive(effect));

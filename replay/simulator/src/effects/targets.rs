@@ -1,20 +1,20 @@
-//! Selection of the sensors that an effect applies to.
+//! Selection of the sensors to which an effect applies.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
 
 use crate::facts::Facts;
 
-/// Parameters of an effect by sensor number.
+/// Parameters of an effect, by the number of the sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerSensor<P>(pub Vec<(usize, P)>);
 
 impl<P: Clone> PerSensor<P> {
-    /// Reads tables whose key `sensors` names the sensors that each applies to.
+    /// Reads an effect's tables. The key `sensors` of a table names the sensors to which the table applies.
     ///
     /// If the key is absent, the table applies to all sensors of these senses. `read` reads the effect's own keys.
     ///
-    /// Errors: the vehicle has no such sensor; a sensor is named twice, or has another sense; a key is unknown.
+    /// Errors: the vehicle lacks a named sensor; a sensor is named twice or has another sense; a key is unknown.
     pub fn read(
         tables: Vec<Section<'_>>,
         facts: &Facts,
@@ -45,7 +45,7 @@ impl<P: Clone> PerSensor<P> {
     }
 }
 
-/// Numbers of the sensors that a table applies to.
+/// Numbers of the sensors to which a table applies.
 ///
 /// Errors: see [`PerSensor::read`].
 pub(super) fn targets(

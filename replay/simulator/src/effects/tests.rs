@@ -1,4 +1,4 @@
-//! Effects combined, and their cost.
+//! Combinations of effects.
 
 mod motion;
 mod sonar;

@@ -18,7 +18,7 @@ use crate::stages::Stage;
 ///
 /// The counter is stationary until vehicle and cable are `hold_m` apart (0.5 by default). Then the drum winds at
 /// `speed_mps` (0.5 by default) until they agree. A drum slower than the vehicle never catches up. Like slack, the
-/// difference is relative to its value when the counter was zeroed, so it has either sign.
+/// difference is relative to its value when the counter was zeroed, so it can have either sign.
 pub(super) struct TetherLagKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -102,7 +102,7 @@ mod tests {
         TetherLag { parameters, counted: None, winding: false }
     }
 
-    /// At a steady speed v, a standstill of h / v is followed by a burst of h / (w - v); the mean lag is half of h.
+    /// At a steady speed v, a standstill of h / v is followed by a burst of h / (w - v). The mean lag is half of h.
     #[test]
     fn count_is_a_sawtooth_at_steady_speed() {
         let (mut winding, period_s) = (winding(), 0.01);
@@ -115,7 +115,7 @@ mod tests {
         let lag = |k: usize| 0.2 * k as f64 * period_s - counts[k];
         assert!((0..counts.len()).all(|k| (-1e-9..=0.502 + 1e-9).contains(&lag(k))));
         let moving = counts.windows(2).filter(|w| w[1] > w[0]).count() as f64 / counts.len() as f64;
-        // The share of time in which it winds is v / w.
+        // The drum winds for a share v / w of the time.
         assert!((moving - 0.2 / 0.6).abs() < 0.01, "{moving}");
         let mean_m = (0..counts.len()).map(lag).sum::<f64>() / counts.len() as f64;
         assert!((mean_m - 0.25).abs() < 0.01, "{mean_m}");

@@ -14,7 +14,7 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// The cable counter is rounded to equal steps, counted from chainage zero.
+/// The cable counter's readings are rounded to equal steps, counted from chainage zero.
 ///
 /// `quantum_m` is the step, 0.01 by default. The device's wire format adds its own quantisation.
 pub(super) struct TetherQuantumKind;
@@ -69,7 +69,7 @@ mod tests {
     use crate::testing_motion::Bench;
 
     #[test]
-    fn counts_are_whole_steps_within_half_a_step_and_evenly_off() {
+    fn counter_readings_are_whole_steps_with_uniform_rounding_errors() {
         let plain: Vec<Payout> = Bench::long("").run("tether");
         let stepped: Vec<Payout> = Bench::long("[effects.tether_quantum]\nquantum_m = 0.05\n").run("tether");
         let mut squares = 0.0;

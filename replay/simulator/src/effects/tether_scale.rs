@@ -1,4 +1,4 @@
-//! The counter's scale is off, and the cable stretches.
+//! Scale error of the cable counter, and stretch of the cable.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -17,13 +17,13 @@ use crate::stages::Stage;
 /// The counter's wheel is larger or smaller than the vehicle file says, and the cable stretches under drag.
 ///
 /// `share` is the relative excess of the counted length, from -0.1 to 0.1 (0). `stiffness_n` is the cable's axial
-/// stiffness EA, in newtons; with it, `drag_npm` is the drag on each metre of moving cable (0.05).
+/// stiffness EA, in newtons. It enables `drag_npm`, the drag on each metre of moving cable (0.05).
 ///
-/// The cable passes the wheel under the tension that the tender keeps. At x metres further in it bears the drag of all
-/// cable behind it, so its mean strain over the length out is drag x / (2 EA). A cable over x metres of tunnel was
-/// therefore counted as x / (1 + drag x / (2 EA)). The strain on the way back is the same. The cable's own hysteresis,
-/// and friction that hasn't built up yet after a turn, aren't simulated. Source: Hooke's law for a rod under evenly
-/// distributed load (Timoshenko, "Strength of Materials", part I, ch. I).
+/// The cable passes the wheel under the tension that the tender keeps. Further in, each point of the cable bears the
+/// drag of all cable between it and the wheel. For x metres of cable, the mean strain is therefore drag x / (2 EA), and
+/// x metres of tunnel are counted as x / (1 + drag x / (2 EA)). The strain on the way back is the same. The cable's own
+/// hysteresis, and friction that hasn't built up yet after a turn, aren't simulated. Source: Hooke's law for a rod
+/// under evenly distributed load (Timoshenko, "Strength of Materials", part I, ch. I).
 pub(super) struct TetherScaleKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,7 +103,7 @@ mod tests {
         assert!(plain.iter().zip(&off).all(|(is, counted)| (counted / is - 1.005).abs() < 1e-12));
     }
 
-    /// Compares with a cable of many short rods, each stretched by the drag of the rods behind it.
+    /// Compares with a cable of many short rods in series, each stretched by the drag on the rods nearer to the wheel.
     #[test]
     fn cable_stretches_like_rods_in_series() {
         let (stiffness_n, drag_npm) = (40_000.0, 0.5);
@@ -113,12 +113,12 @@ mod tests {
             let rod_m = counted_m / f64::from(rods);
             let mut reach_m = 0.0;
             for rod in 0..rods {
-                // The middle of this rod carries the drag of all rods nearer to the wheel.
+                // The middle of this rod carries the drag on all rods nearer to the wheel.
                 let tension_n = drag_npm * (f64::from(rod) + 0.5) * rod_m;
                 reach_m += rod_m * (1.0 + tension_n / stiffness_n);
             }
-            // The drag is computed from the counted length, not the stretched one; they differ by the square of the
-            // strain.
+            // The drag is computed from the counted length instead of the stretched length. The two results differ by
+            // the square of the strain.
             let strain = drag_npm * counted_m / (2.0 * stiffness_n);
             let off = parameters.counted_m(reach_m) / counted_m - 1.0;
             assert!(off.abs() < 1.01 * strain * strain + 1e-9, "{counted_m}: {off}");
@@ -126,9 +126,9 @@ mod tests {
         }
     }
 
-    /// The scene gives no drag, so it is 0.05 N/m; the mean tension is half of the total drag.
+    /// If the scene gives no drag, the drag is 0.05 N/m. The mean tension is half of the total drag.
     #[test]
-    fn keys_stiffness_and_drag_set_the_stretch() {
+    fn stiffness_and_drag_keys_set_the_stretch() {
         let plain = counts("");
         for (keys, strain_pm) in
             [("stiffness_n = 2000\n", 1.25e-5), ("stiffness_n = 2000\ndrag_npm = 0.4\n", 1e-4)]

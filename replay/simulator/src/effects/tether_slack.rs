@@ -1,4 +1,4 @@
-//! Varying slack of the cable.
+//! Slack of the cable that varies.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -18,18 +18,19 @@ use crate::trajectory::{Knots, wandering};
 
 /// The length of cable out differs from the vehicle's travel by a slack that varies smoothly.
 ///
-/// Slack is relative to its mean, which zeroing the counter removes. It therefore has either sign, although no cable is
-/// shorter than the distance. `reach_m` (0.15 by default) is the largest value either way; the standard deviation is
-/// 0.4 of it. `period_s` (30 by default) is the period of the variation: control points of a cubic B-spline are half of
-/// it apart.
+/// Slack is relative to its mean, which zeroing the counter removes. The slack can therefore have either sign, although
+/// no cable is shorter than the distance. `reach_m` (0.15 by default) is the largest value either way; the standard
+/// deviation is 0.4 of the reach. `period_s` (30 by default) is the period of the variation. The control points of a
+/// cubic B-spline are half a period apart.
 ///
-/// `swings` are tables of `reach_m` and `period_s`: a cable that swings as a sine at a random phase with full reach,
-/// even while the vehicle is stationary. With them, the slack varies only if `reach_m` is also given.
+/// `swings` are tables of `reach_m` and `period_s`. With each, the cable swings as a sine of full reach and random
+/// phase, even while the vehicle is stationary. If there are swings, the slack varies additionally only if `reach_m` is
+/// given.
 pub(super) struct TetherSlackKind;
 
 #[derive(Debug, Clone)]
 struct Parameters {
-    /// 0 if the slack doesn't vary.
+    /// Largest slack, m; 0 if the slack doesn't vary.
     reach_m: f64,
     period_s: f64,
     swings: Vec<Swing>,
@@ -41,7 +42,7 @@ struct Swing {
     period_s: f64,
 }
 
-/// Step number reserved for drawing the swings' phases, far from those of knots.
+/// Step number that is reserved for drawing the swings' phases. It is far from the step numbers of knots.
 const PHASES: u64 = u64::MAX;
 
 #[derive(Component)]
@@ -114,9 +115,9 @@ mod tests {
     use super::*;
     use crate::testing_motion::{Bench, LONG, refusal, same_in_any_slices};
 
-    /// The correlation of a cubic B-spline with independent control points falls to zero over four of them.
+    /// The correlation of a cubic B-spline with independent control points falls to zero over four control points.
     #[test]
-    fn slack_has_its_reach_spread_and_period() {
+    fn slack_has_the_given_amplitude_spread_and_period() {
         let keys = "[effects.tether_slack]\nperiod_s = 1\n";
         let (plain, slack) = (Bench::on(LONG, "").run("tether"), Bench::on(LONG, keys).run("tether"));
         let more: Vec<f64> =
@@ -128,7 +129,7 @@ mod tests {
         };
         assert_eq!(plain[25].at.since(plain[0].at).0, 500_000_000);
         let variance = product(0);
-        // Some 600 independent stretches.
+        // The tolerance allows for some 600 independent stretches.
         assert!((math::sqrt(variance) / (0.15 * 0.3997) - 1.0).abs() < 0.1, "{variance}");
         // Source: the autocorrelation of the cubic B-spline, 2416 : 1191 : 120 : 1 at 0, 1, 2, 3 spacings.
         for (spacings, wanted) in [(1, 1191.0), (2, 120.0), (3, 1.0), (4, 0.0)] {
@@ -137,7 +138,8 @@ mod tests {
         }
     }
 
-    /// Compares with sines fitted by least squares: each swing has its reach and period, and nothing is left.
+    /// Compares the slack with sines fitted by least squares. Each swing has its reach and period, and no other slack
+    /// remains.
     #[test]
     fn swings_are_sines_of_full_reach_without_further_slack() {
         let keys = "[effects.tether_slack]\nswings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.055, period_s = 20 }]\n";
@@ -146,7 +148,7 @@ mod tests {
             .iter()
             .zip(&slack)
             .map(|(a, b): (&Payout, &Payout)| (a.at.since(START).as_secs_f64(), b.chainage_m - a.chainage_m));
-        // Whole periods of both swings.
+        // The range of times has whole periods of both swings.
         let more: Vec<(f64, f64)> = more.filter(|(t, _)| *t < 200.0).collect();
         assert!(more.len() > 9000, "{}", more.len());
         let mut left = more.clone();

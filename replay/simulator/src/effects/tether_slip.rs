@@ -1,4 +1,4 @@
-//! Cable slips over the counter's wheel.
+//! Slip of the cable over the counter's wheel.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -15,13 +15,14 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of the travel stretches in each of which the cable may slip once, m.
+/// Length of a stretch of travel, m. The cable slips at most once in each stretch.
 const STRETCH_M: f64 = 1.0;
 
-/// From time to time the the cable slips on the counter's wheel, which changes the count permanently.
+/// From time to time the cable slips over the counter's wheel. A slip changes the count permanently.
 ///
-/// It slips `per_100m` times per hundred metres of travel, forwards or back, by `size_m = [least, most]` (drawn evenly,
-/// 0.05 to 0.3 by default), with either sign. Travel is the vehicle's, summed from count to count.
+/// The cable slips `per_100m` times per hundred metres of travel, forwards or back. The size of a slip is drawn evenly
+/// from `size_m = [least, most]` (0.05 to 0.3 by default), with either sign. Travel is the distance that the vehicle
+/// moves, summed from count to count.
 pub(super) struct TetherSlipKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +38,7 @@ struct TetherSlip {
     at_m: Option<f64>,
     gone_m: f64,
     next_stretch: u64,
-    /// Pending slip in the last drawn stretch: travel at which it happens, and its size, m.
+    /// Slip in the current stretch that hasn't happened yet: the travel at which it happens, and its size, m.
     waiting: Option<(f64, f64)>,
     slipped_m: f64,
 }
@@ -141,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn slips_have_their_rate_and_size_and_are_permanent() {
+    fn slips_have_the_given_rate_and_size_and_are_permanent() {
         let slips = slips((0..4_000_000).map(|k| f64::from(k) * 0.025));
         let n = slips.len() as f64;
         assert!((n - 5000.0).abs() < 5.0 * math::sqrt(5000.0 * 0.95), "{n}");

@@ -9,9 +9,9 @@ use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math::{self, PI};
 use headrace_geometry::tunnel::Yz;
 
-/// Minimum radius of a bend, in half-widths of the tunnel.
+/// Minimum radius of a bend, in multiples of the tunnel's half-width.
 pub(super) const LEAST_RADIUS_HALF_WIDTHS: f64 = 2.0;
-/// Largest difference between two headings.
+/// Largest angle between any two headings of the axis.
 const LARGEST_TURN_RAD: f64 = PI * (1.0 + 1e-12);
 
 /// The tunnel's axis, level at z = 0. It continues straight before chainage 0 and past the last piece.
@@ -24,25 +24,25 @@ pub struct Axis {
 /// A straight piece or an arc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
-    /// Chainage at which it begins.
+    /// Chainage of the start of the piece.
     pub(super) from_m: f64,
-    /// Chainage at which it ends.
+    /// Chainage of the end of the piece.
     pub(super) to_m: f64,
-    /// Chainage of `at`: an end of a straight piece, the middle of an arc.
+    /// Chainage of the point `at`: an end of a straight piece, or the middle of an arc.
     anchor_m: f64,
     at: Yz,
     heading_rad: f64,
     tangent: Yz,
-    /// Curvature, 1/m: zero for a straight piece, positive to the left.
+    /// Curvature, 1/m: zero for a straight piece, positive for a bend to the left.
     curvature_pm: f64,
 }
 
-/// The plane across the axis at one of its points.
+/// A point of the axis, with the plane through it at a right angle to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Station {
-    /// The point of the axis.
+    /// Point of the axis.
     pub(super) at: Yz,
-    /// The axis's direction there, a unit vector.
+    /// Direction of the axis at the point, a unit vector.
     pub(super) tangent: Yz,
 }
 
@@ -55,7 +55,7 @@ impl Axis {
 
     /// Reads the `[[tunnel.axis]]` tables for a tunnel that extends `half_width_m` to the sides.
     ///
-    /// Errors: a key missing, unknown or out of range; a bend that is too tight, or that makes the axis turn back.
+    /// Errors: a key is missing, unknown or out of range; a bend is too tight, or turns the axis back.
     pub(super) fn parse(sections: Vec<Section<'_>>, half_width_m: f64) -> Result<Self, ConfigError> {
         let mut axis = Self::straight();
         let (mut most_left, mut most_right) = (0.0_f64, 0.0_f64);
@@ -65,7 +65,7 @@ impl Axis {
             let heading = axis.pieces.last().map_or(0.0, |piece| piece.heading_rad);
             (most_left, most_right) = (most_left.max(heading), most_right.min(heading));
             if most_left - most_right > LARGEST_TURN_RAD {
-                let problem = "turns the axis by more than 180 degrees from where it pointed before; \
+                let problem = "turns the axis by more than 180 degrees from an earlier heading; \
                                it could meet itself";
                 return Err(section.invalid("turn_deg", problem));
             }
@@ -90,30 +90,30 @@ impl Axis {
         self.pieces.push(Piece::new(end_m, end, heading_rad, f64::INFINITY, 0.0));
     }
 
-    /// Whether it has no bend.
+    /// Whether the axis has no bend.
     pub fn is_straight(&self) -> bool {
         self.pieces.len() == 1 || self.pieces.iter().all(|piece| piece.curvature_pm == 0.0)
     }
 
-    /// The point `[y, z]` (y left, z up, m) of the cross-section at `chainage_m`.
+    /// Converts the point `[y, z]` (y left, z up, m) of the cross-section at `chainage_m` to the tunnel's frame.
     pub fn place(&self, chainage_m: f64, [y, z]: Yz) -> Point3<Tunnel> {
         let Station { at, tangent } = self.station(chainage_m);
         Point3::new(at[0] - y * tangent[1], at[1] + y * tangent[0], z)
     }
 
-    /// Yaw of the axis at `chainage_m` relative to x, radians, positive to the left.
+    /// Heading of the axis at `chainage_m`, radians from x, positive to the left.
     pub fn heading_rad(&self, chainage_m: f64) -> f64 {
         let (_, piece) = self.piece_at(chainage_m);
         piece.heading_rad + piece.curvature_pm * (chainage_m - piece.anchor_m)
     }
 
-    /// Chainage, y and z of a point, m, relative to the nearest point of the axis.
+    /// Converts a point to its chainage, and to y and z relative to the nearest point of the axis, m.
     pub fn chart(&self, point: Point3<Tunnel>) -> [f64; 3] {
         let (_, chainage_m, y) = self.locate([point.x(), point.y()]);
         [chainage_m, y, point.z()]
     }
 
-    /// Number of the nearest piece, chainage, and distance to the left of the axis, m.
+    /// Number of the nearest piece; chainage and distance to the left of the axis, m.
     pub(super) fn locate(&self, plan: Yz) -> (usize, f64, f64) {
         let mut nearest = (0, 0.0, 0.0);
         let mut least = f64::INFINITY;
@@ -122,7 +122,7 @@ impl Axis {
                 continue;
             }
             let (chainage_m, y) = piece.chart(plan);
-            // Beyond a piece's end the distance to the end counts, so that every point belongs to a piece.
+            // Beyond the end of a piece, the distance to the end is added. Every point therefore belongs to a piece.
             let missed = (piece.from_m - chainage_m).max(chainage_m - piece.to_m).max(0.0);
             let distance = y.abs() + missed;
             if distance < least {
@@ -133,19 +133,19 @@ impl Axis {
         nearest
     }
 
-    /// The pieces in the order of chainage.
+    /// The pieces in order of chainage.
     pub(super) fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
-    /// The piece that holds `chainage_m`, and its number.
+    /// Number of the piece at `chainage_m`, and the piece.
     pub(super) fn piece_at(&self, chainage_m: f64) -> (usize, &Piece) {
         let after = self.pieces.partition_point(|piece| piece.from_m <= chainage_m).max(1);
         let number = after.min(self.pieces.len()) - 1;
         (number, &self.pieces[number])
     }
 
-    /// The axis's point and direction at `chainage_m`.
+    /// Point and direction of the axis at `chainage_m`.
     pub(super) fn station(&self, chainage_m: f64) -> Station {
         self.piece_at(chainage_m).1.station(chainage_m)
     }
@@ -170,8 +170,8 @@ impl Piece {
         if curvature_pm == 0.0 {
             return start;
         }
-        // Angles about an arc's centre are relative to its middle: at most a quarter turn either way, far from where
-        // they wrap.
+        // Angles about the centre of an arc are measured from the middle of the arc. They stay within a quarter turn,
+        // far from the wrap at half a turn.
         let anchor_m = from_m + length_m / 2.0;
         let heading_rad = heading_rad + curvature_pm * length_m / 2.0;
         let Station { at, tangent } = start.station(anchor_m);
@@ -183,7 +183,7 @@ impl Piece {
         self.curvature_pm
     }
 
-    /// Point and direction at `chainage_m`, also beyond the ends.
+    /// Point and direction at `chainage_m`, also beyond the ends of the piece.
     pub(super) fn station(&self, chainage_m: f64) -> Station {
         let along_m = chainage_m - self.anchor_m;
         let [tx, ty] = self.tangent;
@@ -195,7 +195,7 @@ impl Piece {
         }
         let turned_rad = along_m * self.curvature_pm;
         let (sin, cos) = math::sin_cos(turned_rad);
-        // 1 - cos from the half angle: a wide bend would lose digits otherwise.
+        // `1 - cos` is computed from the half angle, since the direct form loses digits in a wide bend.
         let half = math::sin(turned_rad / 2.0);
         let (ahead, left) = (sin / self.curvature_pm, 2.0 * half * half / self.curvature_pm);
         Station {
@@ -204,18 +204,19 @@ impl Piece {
         }
     }
 
-    /// Distance to the left of the axis, m.
+    /// Distance of a point to the left of the axis, m.
     pub(super) fn left_of(&self, plan: Yz) -> f64 {
         let (ahead, left) = self.relative(plan);
         if self.curvature_pm == 0.0 {
             return left;
         }
         let radius_m = 1.0 / self.curvature_pm;
-        // With a positive radius the centre is to the left; the rest of the distance to it is the axis's.
+        // With a positive radius the centre is to the left of the axis. The distance to the axis is the radius minus
+        // the distance to the centre.
         radius_m - radius_m.signum() * math::sqrt(ahead * ahead + (radius_m - left) * (radius_m - left))
     }
 
-    /// Chainage and distance to the left of the axis, m.
+    /// Chainage of a point, and its distance to the left of the axis, m.
     pub(super) fn chart(&self, plan: Yz) -> (f64, f64) {
         let (ahead, left) = self.relative(plan);
         if self.curvature_pm == 0.0 {
@@ -226,7 +227,7 @@ impl Piece {
         (self.anchor_m + radius_m.abs() * turned, self.left_of(plan))
     }
 
-    /// Whether this piece is certainly farther from `plan` than `least_m`.
+    /// Whether this piece is certainly farther than `least_m` from `plan`.
     fn is_beyond(&self, plan: Yz, least_m: f64) -> bool {
         let (ahead, left) = self.relative(plan);
         let reach_m = least_m + (self.to_m - self.anchor_m).max(self.anchor_m - self.from_m);
@@ -245,7 +246,7 @@ fn direction(heading_rad: f64) -> Yz {
     [cos, sin]
 }
 
-/// Length, m, and curvature, 1/m, of one piece.
+/// Reads the length, m, and the curvature, 1/m, of one piece.
 fn parse_piece(section: &Section<'_>, half_width_m: f64) -> Result<(f64, f64), ConfigError> {
     let length_m = section.number("length_m", 0.01..=1.0e5)?;
     let radius_m = section.number("radius_m", 0.1..=1.0e5)?;

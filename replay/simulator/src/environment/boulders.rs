@@ -1,4 +1,4 @@
-//! Boulders: single ones, fields of many, or the pieces of a heap.
+//! Boulders: single boulders, fields of boulders, and the pieces of a heap.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
@@ -14,16 +14,16 @@ use super::widths::floor_m;
 
 /// Allowed sizes of a boulder, m.
 const SIZE_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
-/// Default share of a boulder's thickness that is below the wall.
+/// Default share of a boulder's thickness that lies below the wall.
 const SUNK: f64 = 0.3;
-/// Scattered boulders are at least this share of their length in width and thickness.
+/// Minimum ratio of width to length, and of thickness to width, of a scattered boulder.
 const FLATTEST: f64 = 0.5;
 
 /// An ellipsoid on the wall.
 struct Boulder {
     chainage_m: f64,
     arc_m: f64,
-    /// Full diameters: along the tunnel, along the wall, across it, m.
+    /// Full diameters, m: along the tunnel, along the wall, and across the wall.
     size_m: [f64; 3],
     /// Rotation about the wall's normal.
     yaw_rad: f64,
@@ -34,7 +34,7 @@ struct Boulder {
 struct Field {
     from_m: f64,
     to_m: f64,
-    /// Extent along the wall about the floor's centre, m.
+    /// Extent along the wall, centred on the floor's centre, m.
     width_m: f64,
     count: i64,
     size_m: [f64; 2],
@@ -44,7 +44,7 @@ struct Field {
 
 /// Reads one boulder.
 ///
-/// Errors: a key missing or out of range.
+/// Errors: a key is missing or out of range.
 pub(super) fn one(
     table: &Section<'_>,
     ground: Ground<'_>,
@@ -62,7 +62,7 @@ pub(super) fn one(
 
 /// Reads a field of boulders on the floor.
 ///
-/// Errors: a key missing or out of range.
+/// Errors: a key is missing or out of range.
 pub(super) fn many(
     table: &Section<'_>,
     ground: Ground<'_>,
@@ -87,9 +87,9 @@ pub(super) fn many(
     Ok(field.scatter(ground, feature))
 }
 
-/// Reads the pieces of a heap, which lie on its inner half.
+/// Reads the pieces of a heap, which are scattered over the inner half of the heap.
 ///
-/// Errors: a key missing or out of range.
+/// Errors: a key is missing or out of range.
 pub(super) fn pieces(
     table: &Section<'_>,
     ground: Ground<'_>,
@@ -117,7 +117,7 @@ impl Boulder {
         let (wall, [ny, nz]) = ground.tube.wall_place(self.chainage_m, self.arc_m);
         let above_m = half[2] * (1.0 - 2.0 * self.sunk);
         let section = ground.frame(self.chainage_m, [wall[0] + above_m * ny, wall[1] + above_m * nz]);
-        // Across the wall, along it, and along the tunnel, before rotation.
+        // The boulder's axes: across the wall, along the wall, and along the tunnel, before the rotation.
         let normal = section.outwards([0.0, ny, nz]);
         let (sin, cos) = math::sin_cos(self.yaw_rad);
         let length = section.outwards([cos, -sin * nz, sin * ny]);
@@ -135,7 +135,7 @@ impl Field {
         (0..self.count).map(|_| self.boulder(&mut scatter).placed(ground, feature)).collect()
     }
 
-    /// The next boulder: sizes are uniform per octave; width and thickness are at least half the length.
+    /// The next random boulder. The logarithm of its size is uniformly distributed.
     fn boulder(&self, scatter: &mut Scatter) -> Boulder {
         let chainage_m = scatter.between(self.from_m, self.to_m);
         let arc_m = scatter.between(-self.width_m / 2.0, self.width_m / 2.0);
@@ -153,7 +153,8 @@ impl Field {
     }
 }
 
-/// Raises `base` to `exponent` in [0, 1) by square roots, whose exact rounding gives the same result on all machines.
+/// Raises `base` to `exponent` in [0, 1) with square roots. Square roots are exactly rounded and so give the same
+/// result on all machines.
 fn power(base: f64, exponent: f64) -> f64 {
     let (mut result, mut root, mut rest) = (1.0, base, exponent);
     for _ in 0..53 {
@@ -167,7 +168,7 @@ fn power(base: f64, exponent: f64) -> f64 {
     result
 }
 
-/// Reads `size_m`, one number or three.
+/// Reads `size_m`, one diameter or three.
 fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     let wanted = format!(
         "must be a diameter from {} to {}, or three: along the tunnel, along the wall, across the wall",
@@ -182,7 +183,7 @@ fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     }
 }
 
-/// Reads `size_m`, the least and the most.
+/// Reads `size_m`, the smallest and the largest size.
 fn parse_sizes(table: &Section<'_>) -> Result<Option<[f64; 2]>, ConfigError> {
     match table.numbers("size_m", SIZE_M)?.as_deref() {
         None => Ok(None),

@@ -2,38 +2,38 @@
 
 use headrace_geometry::math::{self, PI};
 
-/// A displaced patch of wall, a raised cosine along the tunnel and along the wall.
+/// A displaced patch of wall, with the shape of a raised cosine along the tunnel and along the wall.
 ///
-/// The wall moves along the ray from the profile's reference point. A displacement short of that point therefore leaves
-/// the section star-shaped.
+/// The wall moves along the ray from the profile's reference point. A displacement that ends short of that point
+/// therefore leaves the section star-shaped.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bulge {
-    /// The feature it belongs to.
+    /// Number of the feature that the patch belongs to.
     pub(super) feature: u16,
-    /// Chainage of its middle, m.
+    /// Chainage of the middle, m.
     pub(super) chainage_m: f64,
-    /// Half its extent along the tunnel, m.
+    /// Half the extent along the tunnel, m.
     pub(super) half_length_m: f64,
-    /// Arc length of its middle on the unscaled profile, m.
+    /// Arc length of the middle on the unscaled profile, m.
     pub(super) arc_m: f64,
-    /// Half its extent along the wall of the unscaled profile, m.
+    /// Half the extent along the wall of the unscaled profile, m.
     pub(super) half_width_m: f64,
-    /// Displacement of its middle, inwards positive, m.
+    /// Displacement in the middle, inwards positive, m.
     pub(super) depth_m: f64,
 }
 
 impl Bulge {
-    /// Chainage at which it begins, m.
+    /// Chainage of the start of the patch, m.
     pub(super) fn begin_m(&self) -> f64 {
         self.chainage_m - self.half_length_m
     }
 
-    /// Chainage at which it ends, m.
+    /// Chainage of the end of the patch, m.
     pub(super) fn end_m(&self) -> f64 {
         self.chainage_m + self.half_length_m
     }
 
-    /// Displacement of the wall at a point of the unrolled profile of this perimeter, inwards positive, m.
+    /// Displacement of the wall at a chainage and arc length of a profile with this perimeter, inwards positive, m.
     pub(super) fn displacement_m(&self, chainage_m: f64, arc_m: f64, perimeter_m: f64) -> f64 {
         let along = (chainage_m - self.chainage_m) / self.half_length_m;
         if along.abs() >= 1.0 {
@@ -46,22 +46,22 @@ impl Bulge {
         self.depth_m * raised_cosine(along) * raised_cosine(across)
     }
 
-    /// Its steepest slope along the tunnel.
+    /// Steepest slope along the tunnel.
     pub(super) fn steepest_along(&self) -> f64 {
         self.depth_m.abs() * PI / 2.0 / self.half_length_m
     }
 
-    /// Its steepest slope along the wall.
+    /// Steepest slope along the wall.
     pub(super) fn steepest_across(&self) -> f64 {
         self.depth_m.abs() * PI / 2.0 / self.half_width_m
     }
 
-    /// Whether it comes within `margin_m` of this arc length.
+    /// Whether the patch comes within `margin_m` of this arc length.
     pub(super) fn covers(&self, arc_m: f64, perimeter_m: f64, margin_m: f64) -> bool {
         self.off_middle_m(arc_m, perimeter_m) < self.half_width_m + margin_m
     }
 
-    /// Whether the two overlap.
+    /// Whether the patch overlaps another.
     pub(super) fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
         self.begin_m() < other.end_m()
             && other.begin_m() < self.end_m()
@@ -73,7 +73,7 @@ impl Bulge {
     }
 }
 
-/// A raised cosine: 1 in the middle, 0 with slope 0 at -1 and 1.
+/// A raised cosine: 1 at 0, and 0 with zero slope at -1 and 1.
 fn raised_cosine(x: f64) -> f64 {
     0.5 + 0.5 * math::cos(PI * x)
 }

@@ -1,4 +1,4 @@
-//! The `[[tunnel.features]]` of a scene.
+//! The `[[tunnel.features]]` tables of a scene.
 
 use headrace_config::{ConfigError, Section};
 
@@ -10,7 +10,7 @@ use super::shapes::{Hollow, Solid};
 use super::tube::Tube;
 use super::{boulders, openings};
 
-/// Features other than displaced wall.
+/// All features except displaced wall.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Features {
     pub(super) names: Vec<String>,
@@ -18,10 +18,12 @@ pub(super) struct Features {
     pub(super) hollows: Vec<Placed<Hollow>>,
 }
 
-/// Reads features other than displaced wall from the tables, whose wall [`super::heaps`] and [`super::meshes`] have read,
-/// and checks that no key is left over. `bodies` are those that are meshes.
+/// Reads all features except displaced wall, and checks that no key is left over.
 ///
-/// Errors: a key that is missing, unknown or out of range, or an impossible feature.
+/// [`super::heaps`] and [`super::meshes`] have read the displaced wall and the meshes before. `bodies` are the meshes
+/// in the water.
+///
+/// Errors: a key is missing, unknown or out of range, or a feature is impossible.
 pub(super) fn parse(
     tables: Vec<Section<'_>>,
     heaps: &[Heap],
@@ -73,7 +75,7 @@ impl Features {
     }
 }
 
-/// The hollow, if it opens from the tube's wall and not from a mesh.
+/// Checks that the hollow opens from the tube's wall and not from a mesh, and returns it.
 fn opening(
     ground: Ground<'_>,
     table: &Section<'_>,

@@ -1,4 +1,4 @@
-//! Cartesian frames within the tunnel's.
+//! Cartesian frames at a point of the tunnel.
 
 use headrace_geometry::tunnel::Yz;
 
@@ -8,14 +8,14 @@ use super::vector::{Ray, V3, along, dot, sub};
 /// An origin and three orthogonal unit vectors.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame {
-    /// Its origin.
+    /// Origin, in the tunnel's frame.
     pub(super) origin: V3,
-    /// Its axes.
+    /// Axes, in the tunnel's frame.
     pub(super) axes: [V3; 3],
 }
 
 impl Frame {
-    /// The axis's frame at one of its points: along the tunnel, left, up; the origin at point (y, z) of the section.
+    /// Frame of the axis at a chainage: along the tunnel, left, up. The origin is point (y, z) of the section.
     pub(super) fn across(station: Station, [y, z]: Yz) -> Self {
         let ([tx, ty], [ax, ay]) = (station.tangent, station.at);
         Self { origin: [ax - y * ty, ay + y * tx, z], axes: [[tx, ty, 0.0], [-ty, tx, 0.0], [0.0, 0.0, 1.0]] }

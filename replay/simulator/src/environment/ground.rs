@@ -1,4 +1,4 @@
-//! The tunnel with its wall, in which features are placed.
+//! The tunnel and its wall, for placing features.
 
 use super::frame::Frame;
 use super::placing;
@@ -12,12 +12,12 @@ pub(super) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// The axis's frame at `chainage_m`: along the tunnel, left, up; the origin at point (y, z) of the section.
+    /// Frame of the axis at `chainage_m`: along the tunnel, left, up. The origin is point (y, z) of the section.
     pub(super) fn frame(&self, chainage_m: f64, [y, z]: [f64; 2]) -> Frame {
         Frame::across(self.tube.axis().station(chainage_m), [y, z])
     }
 
-    /// Range of chainage within `reach_m` of a point of the tunnel at `chainage_m`, m.
+    /// Range of chainage that lies within `reach_m` of a point of the tunnel at `chainage_m`, m.
     pub(super) fn span_m(&self, chainage_m: f64, reach_m: f64) -> (f64, f64) {
         placing::span_m(self.tube.axis(), chainage_m, [-reach_m, reach_m])
     }

@@ -1,4 +1,4 @@
-//! Features that displace the wall: bulges, falls of the vault, heaps of debris.
+//! Features that displace the wall: bulges, falls of rock from the vault, heaps of debris.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
@@ -10,33 +10,33 @@ use super::keys::{self, Kind};
 use super::placing::Site;
 use super::widths::floor_m;
 
-/// Largest displacement towards the reference point, as a share of the wall's distance from it.
+/// Largest displacement towards the reference point, as a share of the distance from that point to the wall.
 const DEEPEST_SHARE: f64 = 0.8;
-/// Largest ratio of a patch's depth to its length and width. The wall is then nowhere steeper than 57.5 degrees.
+/// Largest ratio of the depth of a patch to its length and width. It limits the steepness of the wall to 57.5 degrees.
 const DEEPEST_ASPECT: f64 = 1.0;
-/// Ratio of the volume of fallen rock to that of its cavity.
+/// Ratio of the volume of fallen rock to the volume of its cavity.
 const LOOSENING: f64 = 1.5;
-/// Ratio of the length of a fall's heap to that of its cavity.
+/// Ratio of the length of the fallen heap to the length of its cavity.
 const SPREADING: f64 = 1.5;
-/// Points along a patch at which the wall's distance is evaluated.
+/// Number of points along a patch at which the distance to the wall is evaluated.
 const PLACES: u32 = 64;
 
-/// Area of a heap's pieces.
+/// Area over which the pieces of a heap are scattered.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Heap {
-    /// The feature.
+    /// Number of the feature.
     pub(super) feature: u16,
-    /// Its middle, m.
+    /// Chainage of the middle, m.
     pub(super) chainage_m: f64,
-    /// Its extent along the tunnel, m.
+    /// Extent along the tunnel, m.
     pub(super) length_m: f64,
-    /// Its extent along the floor, m.
+    /// Extent along the floor, m.
     pub(super) width_m: f64,
 }
 
-/// Reads displacements of the wall from the tables of features; ignores other keys and features.
+/// Reads displacements of the wall from the tables of features. Ignores other keys and features.
 ///
-/// Errors: the first key that is missing or out of range, or an impossible wall.
+/// Errors: a key is missing or out of range, or the wall is impossible.
 pub(super) fn parse(tables: &[Section<'_>], site: &Site<'_>) -> Result<(Vec<Bulge>, Vec<Heap>), ConfigError> {
     let (mut bulges, mut heaps) = (Vec::new(), Vec::new());
     for (number, table) in tables.iter().enumerate() {
@@ -91,7 +91,7 @@ fn parse_debris(table: &Section<'_>, site: &Site<'_>, feature: u16) -> Result<(B
     Ok((heap.bulge(height_m), heap))
 }
 
-/// The cavity, and the heap of its rock below it.
+/// Reads a fall of rock: the cavity in the vault, and the heap of rock below it.
 fn parse_fall(
     table: &Section<'_>,
     site: &Site<'_>,
@@ -124,7 +124,7 @@ impl Heap {
     }
 }
 
-/// Adds a bulge if the wall allows it beside the earlier ones.
+/// Adds a bulge if the wall and the earlier bulges leave room for it.
 fn add(
     bulges: &mut Vec<Bulge>,
     bulge: Bulge,
@@ -181,7 +181,7 @@ fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     least_m * site.scales.smallest(bulge.begin_m(), bulge.end_m())
 }
 
-/// Arc length of the wall above the reference point, m.
+/// Arc length of the wall vertically above the reference point, m.
 fn crown_m(profile: &Profile) -> f64 {
     let [y, z] = profile.reference();
     profile.arc_of([y, z + 1.0])

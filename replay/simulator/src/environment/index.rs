@@ -2,24 +2,24 @@
 
 use headrace_geometry::math;
 
-/// Objects by the buckets of chainage that they extend into.
+/// Objects in buckets of chainage. An object is listed in each bucket that it extends into.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Index {
     first_m: f64,
     bucket_m: f64,
-    /// Start of each bucket's list, then the end of the last one; empty without objects.
+    /// Start of each bucket's list in `numbers`, then the end of the last list. Empty if there are no objects.
     starts: Vec<usize>,
-    /// Numbers of objects, bucket by bucket. An object in several buckets is listed in each.
+    /// Numbers of objects, bucket by bucket.
     numbers: Vec<u32>,
 }
 
-/// Length of a bucket, m: about the span of a boulder, and several times that of a profiler's ray.
+/// Length of a bucket, m: about the length of a boulder, and several times the span of a profiler's ray.
 const BUCKET_M: f64 = 1.0;
-/// Maximum number of buckets; a longer tunnel has longer buckets.
+/// Maximum number of buckets. A longer tunnel has longer buckets.
 const MOST_BUCKETS: f64 = 65_536.0;
 
 impl Index {
-    /// Indexes objects; object number k extends from `spans[k].0` to `spans[k].1` of chainage, m.
+    /// Indexes objects. Object number k extends from chainage `spans[k].0` to chainage `spans[k].1`, m.
     ///
     /// Allocates: startup only.
     pub(super) fn new(spans: &[(f64, f64)]) -> Self {
@@ -45,7 +45,7 @@ impl Index {
         index
     }
 
-    /// Numbers of all objects that extend into `[from_m, to_m]`, possibly repeated, and with a few nearby ones.
+    /// Numbers of all objects that extend into `[from_m, to_m]`. May repeat numbers and include objects nearby.
     pub(super) fn near(&self, from_m: f64, to_m: f64) -> &[u32] {
         let Some(count) = self.starts.len().checked_sub(1) else { return &[] };
         if to_m < self.first_m {

@@ -1,4 +1,4 @@
-//! Kinds of `[[tunnel.features]]` tables, and keys that several kinds share.
+//! Kinds of `[[tunnel.features]]` tables, and the keys that several kinds share.
 
 use headrace_config::{ConfigError, Section};
 
@@ -28,16 +28,16 @@ const KINDS: [(&str, Kind); 9] = [
     ("side_tunnel", Kind::SideTunnel),
 ];
 
-/// Kind of a table's feature.
+/// Reads the kind of a feature.
 ///
-/// Errors: the key is missing or another word.
+/// Errors: the key is missing or is not a known kind.
 pub(super) fn kind(table: &Section<'_>) -> Result<Kind, ConfigError> {
     table.required("kind", table.choice("kind", &KINDS)?)
 }
 
-/// Its name, or its kind and number.
+/// Reads the name of a feature. The default is its kind and number.
 ///
-/// Errors: empty or too long.
+/// Errors: the name is empty or too long.
 pub(super) fn name(table: &Section<'_>, number: u16) -> Result<String, ConfigError> {
     let given = table.text("name")?;
     if given.as_ref().is_some_and(|name| name.is_empty() || name.len() > 64) {
@@ -47,16 +47,16 @@ pub(super) fn name(table: &Section<'_>, number: u16) -> Result<String, ConfigErr
     Ok(given.unwrap_or_else(|| format!("{kind}_{number}")))
 }
 
-/// The `chainage_m` of a feature's middle, m.
+/// Reads `chainage_m`, the middle of a feature, m.
 ///
-/// Errors: missing, or outside the tunnel.
+/// Errors: the key is missing, or the middle is outside the tunnel.
 pub(super) fn chainage_m(table: &Section<'_>, length_m: f64) -> Result<f64, ConfigError> {
     table.required("chainage_m", table.number("chainage_m", 0.0..=length_m)?)
 }
 
-/// A required length of a feature.
+/// Reads a required length of a feature.
 ///
-/// Errors: missing or outside `allowed`.
+/// Errors: the key is missing or outside `allowed`.
 pub(super) fn length_m(
     table: &Section<'_>,
     key: &'static str,
@@ -65,9 +65,9 @@ pub(super) fn length_m(
     table.required(key, table.number(key, allowed)?)
 }
 
-/// `chainage_m` and the extent `key` along the tunnel of a feature that must lie entirely within the tunnel.
+/// Reads `chainage_m`, and the extent `key` along the tunnel, of a feature that must lie entirely within the tunnel.
 ///
-/// Errors: missing, out of range, or it reaches out of the tunnel.
+/// Errors: a key is missing or out of range, or the feature extends out of the tunnel.
 pub(super) fn extent_m(
     table: &Section<'_>,
     key: &'static str,
@@ -82,9 +82,9 @@ pub(super) fn extent_m(
     Ok((middle_m, extent_m))
 }
 
-/// The `seed` of scattered objects (1).
+/// Reads the `seed` of scattered objects. The default is 1.
 ///
-/// Errors: below zero.
+/// Errors: the seed is negative.
 pub(super) fn seed(table: &Section<'_>) -> Result<u64, ConfigError> {
     Ok(table.integer("seed", 0..=i64::MAX)?.unwrap_or(1).unsigned_abs())
 }

@@ -1,4 +1,4 @@
-//! Meshes as parts of the environment: bodies in the water, and walls in place of the tube's.
+//! Meshes as parts of the environment: bodies in the water, and walls in place of the tube's wall.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use super::frame::Frame;
 use super::vector::{Ray, V3};
 use crate::mesh::Mesh;
 
-/// Distance by which points close to a wall's end plane are moved into the wall, m. In the plane itself the mesh is
-/// open.
+/// Distance by which points close to the end plane of a wall are moved into the wall, m. The mesh is open in the plane
+/// itself.
 const INTO_M: f64 = 1e-7;
 
 /// A closed mesh in the water.
@@ -24,14 +24,14 @@ pub(super) struct MeshWall {
     pub(super) feature: u16,
     pub(super) from_m: f64,
     pub(super) to_m: f64,
-    /// The same span in the mesh's x.
+    /// The same span along the x-axis of the mesh.
     pub(super) x_m: (f64, f64),
     pub(super) frame: Frame,
     pub(super) mesh: Arc<Mesh>,
 }
 
 impl MeshBody {
-    /// First hit of the ray: the range, 0 if it begins inside, and the outward normal.
+    /// First hit of the ray: the range, or 0 if the ray starts inside, and the outward normal.
     pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
         let local = self.frame.local_ray(ray);
         let hit = self.mesh.cast(local.origin, local.direction, f64::MAX)?;
@@ -46,25 +46,25 @@ impl MeshBody {
 }
 
 impl MeshWall {
-    /// The feature.
+    /// Number of the feature.
     pub(super) fn feature(&self) -> u16 {
         self.feature
     }
 
-    /// Chainages between which it is the wall, m.
+    /// Chainages between which the mesh is the wall, m.
     pub(super) fn span_m(&self) -> (f64, f64) {
         (self.from_m, self.to_m)
     }
 
-    /// Whether a point between its end planes, or on one of them, is in the tunnel.
+    /// Whether a point between the end planes, or on an end plane, is in the tunnel.
     pub(super) fn holds(&self, point: V3) -> bool {
         self.mesh.contains(self.between_ends(self.frame.local(point)))
     }
 
-    /// Hit of the ray on the mesh beyond `t_m` in the tunnel, before it passes an end at `until_m`.
+    /// First hit of the ray on the mesh between `t_m` and `until_m`, at which the ray passes an end plane.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, until_m: f64) -> Option<(f64, Face)> {
         let local = self.frame.local_ray(ray);
-        // A ray from a point enclosed by the mesh leaves only through the ends.
+        // A ray from a point enclosed by the mesh leaves the mesh only through the ends.
         let from = self.between_ends(local.at(t_m));
         let hit = self.mesh.cast(from, local.direction, until_m - t_m)?;
         let face = Face { normal: self.frame.outwards(hit.normal), feature: Some(self.feature) };

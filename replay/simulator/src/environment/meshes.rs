@@ -1,6 +1,6 @@
-//! Meshes in a scene: bodies in the water, and stretches of wall in place of the tube's.
+//! Meshes in a scene: bodies in the water, and walls in place of the tube's wall.
 //!
-//! A mesh's axes are those of the tunnel at its origin: x along it, y left, z up, metres.
+//! The axes of a mesh are those of the tunnel at the origin of the mesh: x along the tunnel, y left, z up, metres.
 
 use std::sync::Arc;
 
@@ -17,14 +17,14 @@ use super::shapes::Solid;
 use crate::files::FileLoader;
 use crate::mesh::{self, Mesh, Role};
 
-/// Allowed chainage of a mesh's origin, m. A survey's origin may be far away.
+/// Allowed chainage of the origin of a mesh, m. The origin of a survey may be far away.
 const CHAINAGE_M: core::ops::RangeInclusive<f64> = -1.0e5..=1.0e5;
 /// Allowed position of the origin across the tunnel, m.
 const ACROSS_M: core::ops::RangeInclusive<f64> = -1000.0..=1000.0;
 /// Minimum length of a wall, m.
 const SHORTEST_M: f64 = 0.01;
 
-/// Position of a mesh's origin.
+/// Position of the origin of a mesh.
 struct Place {
     chainage_m: f64,
     across_m: Yz,
@@ -32,8 +32,8 @@ struct Place {
 
 /// Reads the meshes among the tables of features: walls and bodies. Ignores other features.
 ///
-/// Errors: the first key that is missing or out of range, a file that is no mesh, or a mesh in an impossible position.
-/// Allocates: startup only, as [`Mesh::new`].
+/// Errors: a key is missing or out of range, a file is not a mesh, or the position of a mesh is impossible. Allocates:
+/// startup only, like [`Mesh::new`].
 pub(super) fn parse(
     tables: &[Section<'_>],
     site: &Site<'_>,
@@ -82,7 +82,7 @@ fn parse_body(
         let why = format!("reaches out of the tunnel, which goes from 0 to {} m", site.length_m);
         return Err(misplaced(table, (from_m, to_m), &why));
     }
-    // In a bend, a point off the axis may be anywhere ahead or behind.
+    // In a bend, a point off the axis may lie anywhere ahead of the origin or behind it.
     let reach_m = corners.iter().map(|(x, y)| math::hypot(*x, *y)).fold(0.0, f64::max);
     let reach_m = if site.axis.is_straight() { [back_m, ahead_m] } else { [-reach_m, reach_m] };
     let span_m = span_m(site.axis, chainage_m, reach_m);
@@ -106,13 +106,13 @@ fn parse_wall(
         let problem = format!("has {:.3} m of wall along x; at least {SHORTEST_M} m", to_m - from_m);
         return Err(table.invalid("file", &problem));
     }
-    // The origin may lie beyond a bend of the axis; the mesh's x continues straight.
+    // The origin may lie beyond a bend of the axis. The x-axis of the mesh continues straight.
     let (_, piece) = site.axis.piece_at(f64::midpoint(from_m, to_m));
     let frame = Frame::across(piece.station(chainage_m), across_m);
     Ok(MeshWall { feature, from_m, to_m, x_m, frame, mesh: Arc::new(mesh) })
 }
 
-/// Checks that the tunnel around a mesh has its plain profile and a straight axis.
+/// Checks that the tunnel around a mesh is straight and keeps its plain profile.
 ///
 /// Errors: the mesh lies outside the tunnel, meets a bend, or overlaps a change of the wall.
 fn check(
@@ -131,7 +131,7 @@ fn check(
     if site.axis.pieces().iter().any(|piece| bend(piece.from_m, piece.to_m, piece.curvature_pm())) {
         return refuse("meets a bend of the axis; a mesh can be the wall of a straight stretch only");
     }
-    // Farther off the axis, a point's nearest axis point could be in the bend.
+    // At a larger distance from the axis, the nearest point of the axis could lie in the bend.
     let (low, high) = wall.mesh.bounds();
     let (_, piece) = site.axis.piece_at(wall.from_m);
     let left_m = piece.left_of([wall.frame.origin[0], wall.frame.origin[1]]);
@@ -172,7 +172,7 @@ impl Place {
     }
 }
 
-/// The mesh of a table's `file`.
+/// Loads the mesh in the `file` of a table.
 fn read(table: &Section<'_>, role: Role, load: FileLoader<'_>) -> Result<Mesh, ConfigError> {
     let name = table.required("file", table.text("file")?)?;
     let refuse = |why: &str| table.invalid("file", why);
@@ -184,7 +184,7 @@ fn read(table: &Section<'_>, role: Role, load: FileLoader<'_>) -> Result<Mesh, C
     Mesh::new(triangles, role).map_err(|error| refuse(&error.to_string()))
 }
 
-/// An error about a mesh's position.
+/// An error about the position of a mesh.
 fn misplaced(table: &Section<'_>, (from_m, to_m): (f64, f64), why: &str) -> ConfigError {
     let key = if table.keys().contains(&"chainage_m") { "chainage_m" } else { "file" };
     table.invalid(key, &format!("the mesh, from {from_m:.3} to {to_m:.3} m, {why}"))

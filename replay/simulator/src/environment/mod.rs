@@ -3,9 +3,9 @@
 //! The tunnel's frame is Cartesian with its origin at the portal: x along the axis of the first straight part, y left,
 //! z up. In and after a bend, chainage and x differ; see [`Axis`].
 //!
-//! Water is (tube or hollows) without solids. A ray from the water extends to the tube's wall, continues through
-//! hollows that open there, and stops at the first solid. Only boulders and roughness draw random numbers, from their
-//! own seeds.
+//! Water is every point that lies in the tube or in a hollow, but not in a solid. A ray from the water extends to the
+//! tube's wall, continues through hollows that open at that point, and stops at the first solid. Only boulders and
+//! roughness draw random numbers, each from a seed of its own.
 
 mod axis;
 mod boulders;
@@ -59,19 +59,19 @@ use vector::{Ray, V3};
 
 /// Largest length of a ray, m.
 const FARTHEST_M: f64 = 1.0e5;
-/// Minimum advance of a ray beyond the end of the last hollow, m.
+/// Minimum advance of a ray beyond the end of the previous hollow, m.
 const PROGRESS_M: f64 = 1e-9;
-/// Maximum number of hollows and stretches of tube that a ray passes.
+/// Maximum number of hollows and stretches of tube that a ray passes through.
 const MOST_PASSAGES: usize = 1_000;
 
 /// The environment of a scene.
 #[derive(Debug, Clone)]
 pub struct Environment {
-    /// The vehicle file's profile. Points of the wall are expressed in its chart.
+    /// Profile in the vehicle file. Arc lengths of wall points are measured on this profile.
     design: Profile,
     tube: Tube,
     rough: Roughness,
-    /// Whether the tunnel is straight, as designed, and empty. The profile alone then suffices.
+    /// Whether the tunnel is straight, as designed, and empty. Rays are then cast against the profile alone.
     plain: bool,
     solids: Vec<Placed<Solid>>,
     hollows: Vec<Placed<Hollow>>,
@@ -83,17 +83,17 @@ pub struct Environment {
 /// End of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Range, m. On a rough wall it includes the bumps and hollows.
+    /// Range, m. On a rough wall, the range includes the roughness.
     pub range_m: f64,
-    /// Position. On a rough wall it is on the smooth wall underneath.
+    /// Position. On a rough wall, the position lies on the smooth wall underneath.
     pub point: Point3<Tunnel>,
-    /// Unit normal there, towards the water.
+    /// Unit normal at the position, towards the water.
     pub normal: Vec3<Tunnel>,
-    /// Object hit.
+    /// Object that the ray hit.
     pub what: What,
 }
 
-/// Object that a ray meets.
+/// Object that a ray hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
     /// The tunnel's wall.
@@ -105,7 +105,7 @@ pub enum What {
 /// Obstacle that stops a ray, before its normal is computed.
 #[derive(Debug, Clone, Copy)]
 enum Stop {
-    /// The tunnel's wall, with its face if already computed.
+    /// The tunnel's wall, with its face if the face is already computed.
     Wall(Option<Face>),
     Hollow {
         normal: V3,
@@ -117,13 +117,13 @@ enum Stop {
     },
 }
 
-/// Extent of water along a ray.
+/// Stretch of water along a ray.
 #[derive(Debug, Clone, Copy)]
 struct Reach {
     t_m: f64,
-    /// Obstacle that stops the ray; `None` if it is still in water.
+    /// Obstacle that stops the ray; `None` if the ray ends in water.
     stop: Option<Stop>,
-    /// Range of chainage passed, m.
+    /// Range of chainage that the ray passes, m.
     from_m: f64,
     to_m: f64,
 }
@@ -135,11 +135,12 @@ impl Environment {
         Self::new(profile, tube, Roughness::default(), true, Features::default())
     }
 
-    /// Reads a scene's `[tunnel]` table, all of whose keys are optional. `design` is the vehicle file's profile, and `length_m`
-    /// the tunnel's length. `text` loads text files that the table names, `load` other files.
+    /// Reads a scene's `[tunnel]` table, in which all keys are optional.
     ///
-    /// Errors: the first key that is missing, unknown or out of range, or an impossible environment.
-    /// Allocates: startup only.
+    /// `design` is the profile in the vehicle file, and `length_m` is the tunnel's length. `text` loads the text files
+    /// that the table names; `load` loads its other files.
+    ///
+    /// Errors: a key is missing, unknown or out of range, or the environment is impossible. Allocates: startup only.
     pub fn parse(
         section: Option<Section<'_>>,
         design: &Profile,
@@ -175,7 +176,7 @@ impl Environment {
         Self { design, tube, rough, plain, solids, hollows, solids_by_chainage, hollows_by_chainage, names }
     }
 
-    /// Cross-section of the water where the profile isn't scaled, m^2.
+    /// Area of the cross-section of the water where the profile is not scaled, m^2.
     pub(crate) fn area_m2(&self) -> f64 {
         const CORNERS: u32 = 1000;
         let profile = self.tube.profile();
@@ -187,7 +188,7 @@ impl Environment {
         twice_m2.sum::<f64>().abs() / 2.0
     }
 
-    /// Openings of the wall, by name, with the chainages between which they lie, m.
+    /// Names of the openings in the wall, with the chainages between which each opening lies, m.
     pub(crate) fn openings(&self) -> impl Iterator<Item = (&str, [f64; 2])> {
         self.hollows.iter().map(|hollow| {
             let (from_m, to_m) = hollow.span_m;
@@ -195,7 +196,7 @@ impl Environment {
         })
     }
 
-    /// Chainages between which boulders, pieces of heaps and other bodies lie, m.
+    /// Chainages between which each body lies, m. Bodies are boulders, pieces of heaps and other solids.
     pub(crate) fn rubble_m(&self) -> Option<[f64; 2]> {
         let spans = self.solids.iter().map(|solid| solid.span_m);
         spans.fold(None, |all: Option<[f64; 2]>, (from_m, to_m)| {
@@ -206,8 +207,8 @@ impl Environment {
 
     /// Casts a ray from `origin` along the unit vector `direction` to at most `far_m`.
     ///
-    /// `None` if it meets nothing, or the origin isn't in the water. A ray that grazes a displaced or bent wall may
-    /// cross up to 0.1 mm of it unnoticed; elsewhere the result is exact. Allocates: no.
+    /// `None` if the ray hits nothing or `origin` is not in the water. A ray that grazes a displaced or bent wall may
+    /// cross up to 0.1 mm of the wall without a hit. All other results are exact. Allocates: no.
     #[inline]
     pub fn cast(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<Hit> {
         if !self.plain {
@@ -250,16 +251,16 @@ impl Environment {
         })
     }
 
-    /// Replaces the range to the smooth wall by that to the rough wall.
+    /// Replaces the range to the smooth wall by the range to the rough wall.
     ///
-    /// The point stays on the smooth wall, so that it is certain on which side the water is.
+    /// The point stays on the smooth wall, so the side of the wall with the water stays certain.
     fn roughened(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
         let cosine = -direction.dot(&hit.normal);
         let deeper_m = self.rough.deeper_m(hit.point, (hit.range_m, cosine), chainage_m);
         Hit { range_m: hit.range_m + deeper_m, ..hit }
     }
 
-    /// Range of [`Environment::cast`] to the smooth wall, m, at lower cost.
+    /// Range to the smooth wall as in [`Environment::cast`], m, at a lower cost.
     ///
     /// Allocates: no.
     pub fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<f64> {
@@ -278,7 +279,7 @@ impl Environment {
         open && self.solid_around(at).is_none()
     }
 
-    /// First obstruction between two points; a hit at zero range if `from` isn't in the water.
+    /// First obstruction between two points, or a hit at zero range if `from` is not in the water.
     pub fn first_obstruction(&self, from: Point3<Tunnel>, to: Point3<Tunnel>) -> Option<Hit> {
         let between = to - from;
         let length_m = between.norm();
@@ -292,31 +293,32 @@ impl Environment {
         if length_m > 0.0 { self.cast(from, between.scaled(1.0 / length_m), length_m) } else { None }
     }
 
-    /// The axis.
+    /// The tunnel's axis.
     pub fn axis(&self) -> &Axis {
         self.tube.axis()
     }
 
-    /// Arc length of a point on the unrolled wall of the design profile, m: by the ray from its reference point, in the axis's
-    /// chart.
+    /// Arc length of a point on the unrolled wall of the design profile, m.
     ///
-    /// Source: docs/reference/glossary.md, "Tunnel and wall".
+    /// The point is projected along the ray from the reference point of its cross-section. Source:
+    /// docs/reference/glossary.md, "Tunnel and wall".
     pub fn arc_m(&self, point: Point3<Tunnel>) -> f64 {
         let [_, y, z] = self.axis().chart(point);
         self.design.arc_of([y, z])
     }
 
-    /// Names of the features, in the order of the scene.
+    /// Names of the features in the order of the scene.
     pub fn features(&self) -> &[String] {
         &self.names
     }
 
-    /// Name of a feature; empty for an unknown number.
+    /// Name of a feature; empty if the number is unknown.
     pub fn feature_name(&self, index: u16) -> &str {
         self.names.get(usize::from(index)).map_or("", String::as_str)
     }
 
-    /// Extent of water along the ray, at most to `far_m`, and what stops it; `None` from outside the water.
+    /// Stretch of water along the ray, at most to `far_m`, and the obstacle at its end; `None` if the ray starts
+    /// outside the water.
     fn reach(&self, ray: &Ray, far_m: f64) -> Option<Reach> {
         let far_m = far_m.min(FARTHEST_M);
         let mut reach = match self.tube.leave(ray, 0.0, far_m) {
@@ -337,7 +339,7 @@ impl Environment {
                 reach.stop = Some(Stop::Solid { normal, feature: solid.feature });
             }
         }
-        // At range zero the ray begins inside the solid.
+        // A range of zero means that the ray starts inside the solid.
         let in_solid = reach.t_m <= 0.0 && matches!(reach.stop, Some(Stop::Solid { .. }));
         (!in_solid).then_some(reach)
     }
@@ -345,11 +347,11 @@ impl Environment {
     fn start_in_hollow(&self, ray: &Ray) -> Option<Reach> {
         let around = |hollow: &&Placed<Hollow>| hollow.shape.contains(ray.origin);
         let hollow = self.hollows.iter().find(around)?;
-        // The wall here is provisional, since the caller's search for hollows finds this one first.
+        // The wall is provisional: the caller then searches for hollows and finds this hollow first.
         Some(Reach { t_m: 0.0, stop: Some(Stop::Wall(None)), from_m: hollow.span_m.0, to_m: hollow.span_m.1 })
     }
 
-    /// Continues from the end of the tube through the hollows there, and through tube beyond them.
+    /// Extends a ray from the end of the tube through the hollows there, and through tube beyond the hollows.
     fn go_on_through_hollows(&self, ray: &Ray, far_m: f64, reach: &mut Reach) {
         for _ in 0..MOST_PASSAGES {
             let before_m = reach.t_m;
@@ -362,7 +364,7 @@ impl Environment {
             if reach.stop.is_none() {
                 return;
             }
-            // A hollow may end on the wall itself; the tube then begins `SKIN_M` farther.
+            // A hollow may end on the wall itself. The tube then starts `SKIN_M` farther on.
             if let Some(passage) = self.tube.leave(ray, reach.t_m + SKIN_M, far_m)
                 && passage.t_m > reach.t_m + PROGRESS_M
             {
@@ -378,10 +380,12 @@ impl Environment {
         }
     }
 
-    /// The hollow at the ray's end that extends farthest: range of its end, the normal there, and the hollow.
+    /// The hollow at the end of the ray that extends farthest: range of the hollow's end, the normal there, and the
+    /// hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
-        // The index lists hollows by the chainage of their opening; deeper in the rock, each hollow may meet any other.
+        // The index lists hollows by the chainage of their openings. Deeper in the rock, a hollow may meet any other
+        // hollow.
         let (near, all) = if on_wall {
             (self.hollows_by_chainage.near(reach.from_m, reach.to_m), &[][..])
         } else {
@@ -396,7 +400,7 @@ impl Environment {
             .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// The feature whose solid contains a point.
+    /// Number of the feature whose solid contains a point.
     fn solid_around(&self, point: V3) -> Option<u16> {
         let [chainage_m, ..] = self.axis().chart(to_point(point));
         let near = self.solids_by_chainage.near(chainage_m, chainage_m).iter();

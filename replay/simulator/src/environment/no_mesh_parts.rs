@@ -3,7 +3,7 @@
 use super::face::Face;
 use super::vector::{Ray, V3};
 
-/// A wall of triangles; uninhabited in this build.
+/// A wall of triangles. This build has no values of this type.
 #[derive(Debug, Clone)]
 pub(super) enum MeshWall {}
 

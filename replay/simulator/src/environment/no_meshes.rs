@@ -1,4 +1,4 @@
-//! Replaces `meshes.rs` in a build without the feature `mesh`: scenes with meshes are refused.
+//! Replaces `meshes.rs` in a build without the feature `mesh`. Scenes with meshes are refused.
 
 use headrace_config::{ConfigError, Section};
 
@@ -9,9 +9,9 @@ use super::placing::{Placed, Site};
 use super::shapes::Solid;
 use crate::files::FileLoader;
 
-/// Refuses a mesh.
+/// Refuses meshes.
 ///
-/// Errors: a table is a mesh, or has no kind.
+/// Errors: a table is a mesh or has no kind.
 pub(super) fn parse(
     tables: &[Section<'_>],
     _site: &Site<'_>,

@@ -1,4 +1,4 @@
-//! Hollows that open from the tunnel: rock traps, side tunnels, the slots of gates.
+//! Hollows that open from the tunnel: rock traps, side tunnels, and the slots of gates.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
@@ -9,18 +9,18 @@ use super::placing::Placed;
 use super::shapes::{Hollow, Ring, Solid};
 use super::widths::flat_floor_m;
 
-/// Share of its slot's width that a bulkhead fills.
+/// Ratio of the thickness of a bulkhead to the width of its slot.
 const BULKHEAD_SHARE: f64 = 0.6;
-/// Largest angle of a side tunnel from the perpendicular.
+/// Largest angle between a side tunnel and the perpendicular to the tunnel.
 const SLANT_DEG: f64 = 60.0;
-/// Distance from a rock trap's upper edges at which the floor is probed, m.
+/// Distance from the upper edges of a rock trap at which the height of the floor is measured, m.
 const INSIDE_M: f64 = 1e-6;
-/// Step at which a hollow is sampled along its length, m.
+/// Step at which the length of a hollow is sampled, m.
 const STEP_M: f64 = 0.5;
 
 /// Reads a ditch across the floor: an upright box.
 ///
-/// Errors: a key missing or out of range, or a trap that is wider than the tunnel.
+/// Errors: a key is missing or out of range, or the trap is wider than the tunnel.
 pub(super) fn rock_trap(
     table: &Section<'_>,
     ground: Ground<'_>,
@@ -48,7 +48,7 @@ pub(super) fn rock_trap(
     Ok(Placed { shape: Hollow::Block(frame, half), feature, span_m })
 }
 
-/// Height of the floor at a rock trap's edges, the larger of both, m.
+/// Height of the floor at the edges of a rock trap, m. The higher edge counts.
 fn edge_m(ground: Ground<'_>, chainage_m: f64, half_width_m: f64) -> Option<f64> {
     let [_, from_m] = ground.tube.scaled(chainage_m, ground.tube.profile().reference());
     let height_m = |y: f64| {
@@ -59,9 +59,9 @@ fn edge_m(ground: Ground<'_>, chainage_m: f64, half_width_m: f64) -> Option<f64>
     Some(height_m(inside_m)?.max(height_m(-inside_m)?))
 }
 
-/// Reads an auxiliary tunnel: a box that begins in the middle of the tunnel and ends in the rock.
+/// Reads a side tunnel: a box that starts in the middle of the tunnel and ends in the rock.
 ///
-/// Errors: a key missing or out of range, or a mouth that is higher than the tunnel.
+/// Errors: a key is missing or out of range, or the mouth is higher than the tunnel.
 pub(super) fn side_tunnel(
     table: &Section<'_>,
     ground: Ground<'_>,
@@ -87,7 +87,7 @@ pub(super) fn side_tunnel(
     let to_wall_m = ground.tube.section_range_m(chainage_m, [middle_m, centre_m], [side, 0.0]).unwrap_or(0.0);
     let (sin, cos) = math::sin_cos(slant_rad);
     let whole_m = to_wall_m / cos + length_m;
-    // A positive slant points towards growing chainage on either side; the opening's middle stays at the given
+    // A positive slant points towards growing chainage on either side. The middle of the opening stays at the given
     // chainage.
     let mut frame = ground.frame(chainage_m, [middle_m, centre_m]);
     let start = frame.outwards([-to_wall_m * sin / cos, 0.0, 0.0]);
@@ -103,7 +103,7 @@ pub(super) fn side_tunnel(
     Ok(Placed { shape: Hollow::Block(frame, half), feature, span_m })
 }
 
-/// Chainages over which a side tunnel opens into the tunnel, also beside a bend, m.
+/// Range of chainage over which a side tunnel opens into the tunnel, m. Valid also next to a bend.
 fn mouth_span_m(
     ground: Ground<'_>,
     chainage_m: f64,
@@ -127,9 +127,9 @@ fn mouth_span_m(
     span_m
 }
 
-/// Reads a gate: a slot all round, and its bulkhead if it is closed.
+/// Reads a gate: a slot around the whole section, and a bulkhead if the gate is closed.
 ///
-/// Errors: a key missing or out of range.
+/// Errors: a key is missing or out of range.
 pub(super) fn gate(
     table: &Section<'_>,
     ground: Ground<'_>,
@@ -141,7 +141,7 @@ pub(super) fn gate(
     let profile = ground.tube.profile();
     let reference = ground.tube.scaled(chainage_m, profile.reference());
     let scale = ground.tube.scale(chainage_m);
-    // The depth is measured at the sides, at the height of the reference point.
+    // The depth of the slot is measured at the sides, at the height of the reference point.
     let to_side_m = ground.tube.section_range_m(chainage_m, reference, [1.0, 0.0]).unwrap_or(depth_m);
     let enlarged = scale * (1.0 + depth_m / to_side_m);
     let ring = Ring {
@@ -152,7 +152,7 @@ pub(super) fn gate(
         scale: enlarged,
     };
     let span_m = ground.span_m(chainage_m, width_m / 2.0);
-    // At least as large as the slot: no ray meets the part in the rock.
+    // The bulkhead is at least as large as the slot. No ray reaches the part in the rock.
     let reach_m = enlarged * profile.farthest_m(profile.reference());
     let bulkhead = closed.then(|| Placed {
         shape: Solid::Block(

@@ -5,10 +5,11 @@ use headrace_geometry::tunnel::Profile;
 use super::axis::Axis;
 use super::stations::Scales;
 
-/// Largest ratio of an object's span of chainage to its length, on the inside of the tightest bend.
+/// Largest ratio of an object's span of chainage to its length. The ratio is largest on the inside of the tightest
+/// bend.
 const BEND: f64 = 2.0;
 
-/// A shape, its feature, and the range of chainage that it extends into, m.
+/// A shape, the number of its feature, and the range of chainage that the shape extends into, m.
 #[derive(Debug, Clone)]
 pub(super) struct Placed<S> {
     pub(super) shape: S,
@@ -23,11 +24,11 @@ pub(super) struct Site<'a> {
     pub(super) scales: &'a Scales,
     pub(super) axis: &'a Axis,
     pub(super) length_m: f64,
-    /// Largest extent of the section to the sides of the axis, m.
+    /// Largest distance of the section's wall to either side of the axis, m.
     pub(super) half_width_m: f64,
 }
 
-/// Chainages of objects within `reach_m` (least, largest) along the axis's direction at `chainage_m`, m.
+/// Range of chainage of an object at `chainage_m` that extends `reach_m` (least, largest) along the axis, m.
 pub(super) fn span_m(axis: &Axis, chainage_m: f64, reach_m: [f64; 2]) -> (f64, f64) {
     let [back_m, ahead_m] = reach_m.map(|reach_m| if axis.is_straight() { reach_m } else { BEND * reach_m });
     (chainage_m + back_m, chainage_m + ahead_m)

@@ -1,6 +1,7 @@
-//! Roughness of the wall: random heights about the smooth wall, correlated over some length.
+//! Roughness of the wall: random heights about the smooth wall, correlated over a given length.
 //!
-//! A place has the same height for every beam, sensor and pass. Roughness therefore can't be averaged away like noise.
+//! A point of the wall has the same height for every beam, sensor and pass. Averaging therefore does not reduce
+//! roughness as it reduces noise.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -10,16 +11,17 @@ use super::keys;
 use super::scatter::Scatter;
 use crate::stretch::Stretch;
 
-/// Below this cosine of incidence a beam doesn't reach deeper between the bumps, since they hide one another.
+/// Least cosine of incidence for the effect of a height on the range. At more grazing incidence the bumps hide the
+/// hollows between them.
 const LEAST_COSINE: f64 = 0.25;
-/// Standard deviation of the sum of four 16-bit numbers, as a share of their range: the root of 4 / 12.
+/// Standard deviation of the sum of four 16-bit random numbers, in units of their range: the square root of 4 / 12.
 const SUM_SD: f64 = 0.577_350_269_189_625_8;
 
 /// Rough stretches of the tunnel.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Roughness(Vec<(Stretch, Heights)>);
 
-/// Heights of a stretch: random numbers at the nodes of a cubic lattice, with weighted means between nodes.
+/// Heights of a stretch: random numbers at the nodes of a cubic lattice, interpolated between the nodes.
 #[derive(Debug, Clone, Copy)]
 struct Heights {
     sd_m: f64,
@@ -31,9 +33,9 @@ impl Roughness {
     /// Reads `[[tunnel.rough]]`.
     ///
     /// Keys: `from_m`, `to_m`; the standard deviation `sd_m` of the heights, from 0.001 to 0.3; the correlation length
-    /// `length_m`, from 0.02 to 5 (0.3), beyond which heights are independent; `seed` (1).
+    /// `length_m`, from 0.02 to 5 (0.3), beyond which heights are independent; and `seed` (1).
     ///
-    /// Errors: a key that is missing or out of range, or stretches that overlap.
+    /// Errors: a key is missing or out of range, or stretches overlap.
     pub(super) fn parse(tables: Vec<Section<'_>>, tunnel_m: f64) -> Result<Self, ConfigError> {
         let mut all: Vec<(Stretch, Heights)> = Vec::new();
         for table in tables {
@@ -50,9 +52,9 @@ impl Roughness {
         Ok(Self(all))
     }
 
-    /// Excess range of the rough wall over the smooth wall, m.
+    /// Difference between the range to the rough wall and the range to the smooth wall, m.
     ///
-    /// The beam meets the smooth wall at `point` after `range_m`, at this cosine of incidence.
+    /// The beam meets the smooth wall at `point`, at range `range_m` and with this cosine of incidence.
     pub(super) fn deeper_m(
         &self,
         point: Point3<Tunnel>,
@@ -66,13 +68,13 @@ impl Roughness {
         let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else {
             return 0.0;
         };
-        // No bump reaches more than halfway to the sonar.
+        // A bump reaches at most halfway to the sonar.
         (heights.at_m(point) / cosine.max(LEAST_COSINE)).max(-range_m / 2.0)
     }
 }
 
 impl Heights {
-    /// Distance of the wall outside the smooth wall, m.
+    /// Distance from the smooth wall outwards to the rough wall, m.
     fn at_m(&self, point: Point3<Tunnel>) -> f64 {
         let places = [point.x(), point.y(), point.z()].map(|x_m| {
             let share = x_m / self.length_m;
@@ -90,11 +92,12 @@ impl Heights {
             sum += weight * self.number(nodes);
             squares += weight * weight;
         }
-        // A mean of several numbers has less spread than each; this restores the spread.
+        // A weighted mean of several numbers has a smaller standard deviation than each number. The division restores
+        // it.
         self.sd_m * sum / math::sqrt(squares)
     }
 
-    /// A node's random number: mean zero, standard deviation one.
+    /// Random number of a node, with mean zero and standard deviation one.
     fn number(&self, nodes: [i64; 3]) -> f64 {
         let mut hash = self.seed;
         for node in nodes {

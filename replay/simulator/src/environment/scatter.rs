@@ -1,12 +1,12 @@
-//! Pseudo-random numbers for objects in the tunnel, each from its own seed.
+//! Pseudo-random numbers for objects in the tunnel. Each feature has its own seed.
 
-/// SplitMix64.
+/// The SplitMix64 generator.
 ///
 /// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
 pub(super) struct Scatter(pub(super) u64);
 
 impl Scatter {
-    /// The next number.
+    /// The next 64-bit number.
     pub(super) const fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

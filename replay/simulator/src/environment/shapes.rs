@@ -1,6 +1,6 @@
 //! Bodies in the water and hollows in the rock.
 //!
-//! A body gives the first hit of a ray; a hollow gives the length over which a ray inside it continues. A new kind of
+//! A body returns the first hit of a ray. A hollow returns the distance that a ray inside it travels. A new kind of
 //! shape is a new variant of [`Solid`] or [`Hollow`].
 
 use headrace_geometry::math;
@@ -11,45 +11,45 @@ use super::frame::Frame;
 use super::mesh_parts::MeshBody;
 use super::vector::{Ray, V3, along, dot, unit};
 
-/// Distance by which a ray's point may miss a hollow and still continue in it, m.
+/// Largest distance between a point and a hollow at which the point counts as in the hollow, m.
 ///
-/// A hollow's face may lie on the wall itself, like the upper face of a ditch on a flat floor. Rounding must leave no
-/// wall between them.
+/// A face of a hollow may lie on the wall itself, like the upper face of a ditch on a flat floor. Rounding must leave
+/// no wall between tube and hollow.
 pub(super) const SKIN_M: f64 = 1e-6;
 
-/// A solid that stops a ray.
+/// A body that stops a ray.
 #[derive(Debug, Clone)]
 pub(super) enum Solid {
-    /// An ellipsoid with these half diameters along the frame's axes, m.
+    /// An ellipsoid with these half diameters along the axes of the frame, m.
     Ellipsoid(Frame, V3),
-    /// A box with these half lengths along the frame's axes, m.
+    /// A box with these half lengths along the axes of the frame, m.
     Block(Frame, V3),
-    /// Triangles around a body.
+    /// A body enclosed by triangles.
     #[cfg(feature = "mesh")]
     Mesh(MeshBody),
 }
 
-/// A hollow that a ray passes beyond the tunnel's wall.
+/// A hollow in the rock beyond the tunnel's wall, through which a ray continues.
 #[derive(Debug, Clone)]
 pub(super) enum Hollow {
-    /// A box with these half lengths along the frame's axes, m.
+    /// A box with these half lengths along the axes of the frame, m.
     Block(Frame, V3),
     /// A slot around the whole tunnel.
     Ring(Ring),
 }
 
-/// A short length of a wider tunnel: the profile scaled.
+/// A short length of a wider tunnel: the profile, scaled up.
 #[derive(Debug, Clone)]
 pub(super) struct Ring {
-    /// Origin on the axis at z = 0; axes along the tunnel, left, up.
+    /// Frame with its origin on the axis at z = 0, and axes along the tunnel, left and up.
     pub(super) frame: Frame,
-    /// Half its extent along the tunnel, m.
+    /// Half the extent along the tunnel, m.
     pub(super) half_width_m: f64,
     /// The profile before scaling.
     pub(super) profile: Profile,
-    /// The point (y, z) that lies at the profile's reference point.
+    /// Point (y, z) of the section about which the profile is scaled: the profile's reference point.
     pub(super) reference: Yz,
-    /// Scale about that point.
+    /// Scale of the profile.
     pub(super) scale: f64,
 }
 
@@ -60,7 +60,7 @@ struct Chord {
 }
 
 impl Solid {
-    /// First hit of the ray: the range, 0 if it begins inside, and the outward normal.
+    /// First hit of the ray: the range, or 0 if the ray starts inside, and the outward normal.
     pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
         let chord = match self {
             Self::Ellipsoid(frame, half) => ellipsoid_chord(frame, *half, ray)?,
@@ -88,7 +88,8 @@ impl Solid {
 }
 
 impl Hollow {
-    /// End of the ray's passage from `t_m`, which must be inside, and the normal towards the water there.
+    /// Range at which the ray leaves the hollow, and the normal towards the water there; `None` if the point at `t_m`
+    /// is not in the hollow.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64) -> Option<(f64, V3)> {
         match self {
             Self::Block(frame, half) => {
@@ -121,7 +122,8 @@ impl Ring {
 
     fn leave(&self, ray: &Ray, t_m: f64) -> Option<(f64, V3)> {
         let ray = self.frame.local_ray(ray);
-        // Tested slightly ahead, since rounding decides whether a point on the hollow's own wall is inside.
+        // The point tested lies slightly ahead, since rounding decides whether a point on the wall of the hollow is
+        // inside.
         let t_m = t_m + SKIN_M;
         let at = ray.at(t_m);
         if !self.holds(at) {
@@ -172,8 +174,8 @@ fn block_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
 
 fn ellipsoid_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
     let local = frame.local_ray(ray);
-    // In units of the half diameters it is a unit sphere. The half chord follows from the ray's least distance to the
-    // centre, which loses no digits, unlike b * b - a * c.
+    // In units of the half diameters, the ellipsoid is a unit sphere. Half the chord follows from the ray's least
+    // distance to the centre. Unlike b * b - a * c, that distance loses no digits.
     let origin = [local.origin[0] / half[0], local.origin[1] / half[1], local.origin[2] / half[2]];
     let slope = [local.direction[0] / half[0], local.direction[1] / half[1], local.direction[2] / half[2]];
     let a = dot(slope, slope);

@@ -2,20 +2,23 @@
 
 use headrace_config::{ConfigError, Section};
 
-/// Largest change of the wall's distance from the floor's centre per metre of chainage.
+/// Largest change of the distance between the wall and the floor's centre, per metre of chainage.
 const STEEPEST: f64 = 1.0;
 
-/// Scale of the profile by chainage: linear between stations, constant outside; 1 without stations.
+/// Scale of the profile by chainage: linear between stations, constant before the first and after the last station, and
+/// 1 without stations.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scales {
-    /// Chainage, m, and scale, in order of chainage.
+    /// Chainage, m, and scale of each station, in order of chainage.
     stations: Vec<(f64, f64)>,
 }
 
 impl Scales {
-    /// Reads the `[[tunnel.stations]]` tables. `farthest_m` is the wall's largest distance from the floor's centre, m.
+    /// Reads the `[[tunnel.stations]]` tables. `farthest_m` is the largest distance of the wall from the floor's
+    /// centre, m.
     ///
-    /// Errors: a key missing, unknown or out of range; stations out of order, or too steep a change between two.
+    /// Errors: a key is missing, unknown or out of range, stations are out of order, or the scale changes too steeply
+    /// between two stations.
     pub(super) fn parse(
         sections: Vec<Section<'_>>,
         farthest_m: f64,
@@ -45,7 +48,7 @@ impl Scales {
         Ok(Self { stations })
     }
 
-    /// Chainages at which the slope changes, m.
+    /// Chainages at which the slope of the scale changes, m.
     pub(super) fn breaks(&self) -> impl Iterator<Item = f64> + '_ {
         self.stations.iter().map(|station| station.0)
     }
@@ -62,7 +65,7 @@ impl Scales {
         }
     }
 
-    /// Change of scale per metre between two chainages with no station between them, 1/m.
+    /// Slope of the scale between two chainages, 1/m. No station may lie between them.
     pub(super) fn slope_pm(&self, from_m: f64, to_m: f64) -> f64 {
         if from_m.is_finite() && to_m.is_finite() {
             (self.at(to_m) - self.at(from_m)) / (to_m - from_m)

@@ -1,16 +1,16 @@
-//! Bound on the gauge's slope, which sets the steps along rays.
+//! Upper bound on the gauge's slope, which sets the length of steps along rays.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
 
 use super::bulge::Bulge;
 
-/// Directions in which a profile is sampled.
+/// Number of directions in which a profile is sampled.
 const DIRECTIONS: u32 = 2_000;
-/// Allowance for directions between the samples.
+/// Factor on the slope, for directions between the samples.
 const MARGIN: f64 = 1.05;
-/// Largest ratio of chainage speed to the point's speed, on the inside of a bend. Bends are no tighter than twice the
-/// tunnel's reach.
+/// Largest ratio of change of chainage to distance travelled. It occurs at the inner wall of the tightest allowed bend,
+/// which has a radius of twice the tunnel's half-width.
 const INSIDE_OF_BEND: f64 = 2.0;
 
 /// The wall of a profile as seen from its reference point.
@@ -18,7 +18,7 @@ const INSIDE_OF_BEND: f64 = 2.0;
 pub(super) struct Steepness {
     views: Vec<View>,
     perimeter_m: f64,
-    /// The largest distance of the wall from the floor's centre, m.
+    /// Largest distance of the wall from the floor's centre, m.
     farthest_m: f64,
 }
 
@@ -26,9 +26,9 @@ pub(super) struct Steepness {
 #[derive(Debug, Clone, Copy)]
 struct View {
     arc_m: f64,
-    /// Its distance from the reference point, m.
+    /// Distance from the reference point to the wall, m.
     radius_m: f64,
-    /// The distance of its tangent from the reference point, m.
+    /// Distance from the reference point to the wall's tangent, m.
     tangent_m: f64,
 }
 
@@ -51,11 +51,12 @@ impl Steepness {
         }
     }
 
-    /// An upper bound on the slope of the gauge, in places where the gauge is at most 1, 1/m.
+    /// An upper bound on the slope of the gauge, 1/m. It holds wherever the gauge is at most 1.
     ///
-    /// With the wall at R(phi) from the reference point, displaced by D(chainage, arc), the gauge is rho / (R - D). In
-    /// the section its slope is sqrt(1 + (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel D's own slope adds to it,
-    /// and so does the change of scale, which moves points in proportion to their distance from the floor's centre.
+    /// Let R(phi) be the distance of the wall from the reference point, and D(chainage, arc) the displacement of the
+    /// wall. The gauge of a point at distance rho is rho / (R - D). The slope of the gauge in the section is sqrt(1 +
+    /// (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel, the slope of D adds to the slope of the gauge. So does the
+    /// change of scale, which moves points in proportion to their distance from the floor's centre.
     pub(super) fn gauge_slope_pm(
         &self,
         bulges: &[Bulge],
@@ -71,9 +72,9 @@ impl Steepness {
                 .fold(0.0, f64::max)
     }
 
-    /// Slopes within the section and along the tunnel.
+    /// Slopes of the gauge within the section and along the tunnel.
     fn at(&self, view: &View, bulges: &[Bulge], scale: f64, scale_slope_pm: f64) -> (f64, f64) {
-        // Distance along the wall to the next direction but one.
+        // Distance along the wall over two steps of direction.
         let margin_m = 2.0 * TAU / f64::from(DIRECTIONS) * view.radius_m * view.radius_m / view.tangent_m;
         let (mut inwards_m, mut outwards_m, mut along, mut across) = (0.0, 0.0, 0.0, 0.0);
         for bulge in bulges.iter().filter(|b| b.covers(view.arc_m, self.perimeter_m, margin_m)) {

@@ -1,4 +1,4 @@
-//! Scenes as text and pseudo-random numbers for the tests below, one file per subject.
+//! Scenes as text, and pseudo-random numbers, for the tests below. Each file covers one subject.
 
 use headrace_config::Document;
 use headrace_geometry::frames::{Point3, Vec3};
@@ -18,7 +18,7 @@ mod walls;
 /// Length of the tunnels under test, m.
 const LENGTH_M: f64 = 100.0;
 
-/// Knuth's MMIX generator.
+/// Knuth's MMIX random number generator.
 struct Lcg(u64);
 
 impl Lcg {
@@ -27,7 +27,7 @@ impl Lcg {
         least + (most - least) * ((self.0 >> 11) as f64 / (1_u64 << 53) as f64)
     }
 
-    /// A direction; every other one nearly across the tunnel, as a profiler looks.
+    /// A random direction. Every second direction is nearly across the tunnel, like a profiler's beam.
     fn direction(&mut self) -> V3 {
         let flat = if self.between(0.0, 1.0) < 0.5 { 0.05 } else { 1.0 };
         loop {

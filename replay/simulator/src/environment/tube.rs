@@ -1,13 +1,15 @@
-//! The tunnel's wall: a profile that follows the axis, changes its scale and is displaced in places.
+//! The tunnel's wall: a profile that follows the axis, with a variable scale and local displacements.
 //!
-//! The gauge of a point is its distance from the reference point divided by the wall's in the same direction: below 1
-//! in the tunnel, 1 on the wall. With a constant axis and scale and no displacement, the wall has a closed form.
-//! Elsewhere a ray advances in steps of (1 - gauge) divided by a bound on the gauge's slope. Such steps can't pass the
-//! wall, however thin a protrusion is. Only the last steps are at least [`LEAST_STEP_M`] long, so a ray may cross rock
-//! unnoticed over less than that.
+//! The gauge of a point compares two distances from the reference point: the distance to the point, divided by the
+//! distance to the wall in the same direction. The gauge is below 1 in the tunnel and 1 on the wall.
 //!
-//! A mesh that replaces the wall has a stretch to itself. The planes across its ends are also wall wherever water on
-//! one side meets rock on the other, so that a ray can't escape if profile and mesh don't fit.
+//! If the axis is straight, the scale constant and the wall not displaced, the range to the wall has a closed form.
+//! Otherwise a ray advances in steps of (1 - gauge) divided by an upper bound on the slope of the gauge. Such steps
+//! cannot pass the wall, however thin a protrusion is. Only the last steps have a minimum length of [`LEAST_STEP_M`],
+//! so a ray may cross less than that length of rock unnoticed.
+//!
+//! A mesh that replaces the wall has a stretch of its own. The planes at its ends are also wall where water on one side
+//! meets rock on the other. A ray therefore cannot escape if profile and mesh do not fit.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -21,13 +23,13 @@ use super::steepness::Steepness;
 use super::vector::{Ray, V3, unit};
 use super::widths::half_width_m;
 
-/// The least step along a ray, m.
+/// Minimum length of a step along a ray, m.
 const LEAST_STEP_M: f64 = 1e-4;
 /// Accuracy of the point where a ray meets the wall, m.
 const ROOT_M: f64 = 1e-11;
-/// Displacement beyond which the wall is attributed to the feature, m.
+/// Displacement above which the wall is attributed to the feature, m.
 const FEATURE_M: f64 = 1e-3;
-/// Half the distance over which a displaced wall's normal is differenced, m.
+/// Half the baseline of the differences that give the normal of a displaced wall, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
 /// The wall along the whole tunnel.
@@ -35,49 +37,49 @@ const NORMAL_STEP_M: f64 = 1e-5;
 pub(super) struct Tube {
     axis: Axis,
     profile: Profile,
-    /// The floor's centre, about which the profile is scaled.
+    /// Centre of the floor, about which the profile is scaled.
     floor: Yz,
     scales: Scales,
     bulges: Vec<Bulge>,
-    /// Meshes that replace the wall. None overlaps a bend, a change of scale, a bulge or another mesh.
+    /// Meshes that replace the wall. They overlap no bend, change of scale, bulge or other mesh.
     meshes: Vec<MeshWall>,
     /// The stretches, without gaps, from -infinity to +infinity of chainage.
     stretches: Vec<Stretch>,
 }
 
-/// A length of tunnel within one piece of the axis, over which the scale is linear and the set of displacements the same.
+/// A length of tunnel within one piece of the axis, with a linear scale and a fixed set of displacements.
 #[derive(Debug, Clone)]
 struct Stretch {
     from_m: f64,
     piece: Piece,
-    /// The planes across its ends; none at infinity.
+    /// The planes at the ends; `None` for an end at infinity.
     ends: [Option<Station>; 2],
-    /// Scale at its beginning, constant where the slope is zero.
+    /// Scale at the start of the stretch, or of the whole stretch if the slope is zero.
     scale: f64,
     scale_slope_pm: f64,
-    /// Numbers of the bulges that extend into it.
+    /// Numbers of the bulges that extend into the stretch.
     bulges: Vec<usize>,
-    /// Number of the mesh that is the wall here.
+    /// Number of the mesh that is the wall of this stretch.
     mesh: Option<usize>,
-    /// Reciprocal of a bound on the gauge's slope, m.
+    /// Reciprocal of an upper bound on the gauge's slope, m.
     step_m: f64,
 }
 
-/// A ray's passage through the tube.
+/// Passage of a ray through the tube.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Passage {
-    /// Distance along the ray at which it leaves, m, or the given limit.
+    /// Distance along the ray at which the ray leaves the tube or reaches the given limit, m.
     pub(super) t_m: f64,
-    /// Whether it ends at wall.
+    /// Whether the passage ends at the wall.
     pub(super) wall: bool,
-    /// The wall there, if known without further computation.
+    /// The wall at the end, if known without further computation.
     pub(super) face: Option<Face>,
-    /// Chainage of the beginning and the end, m.
+    /// Chainages of the start and the end, m.
     pub(super) chainages_m: [f64; 2],
 }
 
 impl Tube {
-    /// The wall of `profile` along `axis`, except where a mesh is the wall.
+    /// Builds the wall of `profile` along `axis`, except where a mesh is the wall.
     ///
     /// Allocates: startup only.
     pub(super) fn new(
@@ -91,7 +93,7 @@ impl Tube {
         let mut breaks: Vec<f64> = axis.pieces().iter().map(|piece| piece.from_m).collect();
         breaks.extend(scales.breaks());
         breaks.extend(bulges.iter().flat_map(|bulge| [bulge.begin_m(), bulge.end_m()]));
-        // A mesh has a single stretch, even where straight pieces of the axis meet in it.
+        // A mesh has a single stretch, even if straight pieces of the axis meet within it.
         let spans: Vec<(f64, f64)> = meshes.iter().map(MeshWall::span_m).collect();
         breaks.retain(|at_m| !spans.iter().any(|(from_m, to_m)| from_m < at_m && at_m < to_m));
         breaks.extend(spans.iter().flat_map(|(from_m, to_m)| [*from_m, *to_m]));
@@ -133,18 +135,18 @@ impl Tube {
         }
     }
 
-    /// Number of the mesh that is the wall somewhere between two chainages, and the mesh.
+    /// Number of the mesh that is the wall anywhere between two chainages, and the mesh.
     fn mesh_over(&self, from_m: f64, to_m: f64) -> Option<(usize, &MeshWall)> {
         let overlaps = |(begin_m, end_m): (f64, f64)| begin_m < to_m && from_m < end_m;
         self.meshes.iter().enumerate().find(|(_, mesh)| overlaps(mesh.span_m()))
     }
 
-    /// The feature whose mesh is the wall somewhere between two chainages.
+    /// Number of the feature with the mesh that is the wall anywhere between two chainages.
     pub(super) fn mesh_within(&self, from_m: f64, to_m: f64) -> Option<u16> {
         self.mesh_over(from_m, to_m).map(|(_, mesh)| mesh.feature())
     }
 
-    /// The axis.
+    /// The tunnel's axis.
     pub(super) fn axis(&self) -> &Axis {
         &self.axis
     }
@@ -154,7 +156,7 @@ impl Tube {
         &self.profile
     }
 
-    /// Extent of the tube to the sides of its axis, m.
+    /// Largest distance of the tube's wall to either side of the axis, m.
     pub(super) fn reach_m(&self) -> f64 {
         let outwards_m = self.bulges.iter().map(|bulge| -bulge.depth_m).fold(0.0, f64::max);
         half_width_m(&self.profile) * self.scales.largest() + outwards_m
@@ -165,15 +167,15 @@ impl Tube {
         self.scales.at(chainage_m)
     }
 
-    /// Scales a point of the unscaled profile to `chainage_m`.
+    /// Converts a point of the unscaled profile to the scale at `chainage_m`.
     pub(super) fn scaled(&self, chainage_m: f64, unscaled: Yz) -> Yz {
         let scale = self.scale(chainage_m);
         let [fy, fz] = self.floor;
         [fy + (unscaled[0] - fy) * scale, fz + (unscaled[1] - fz) * scale]
     }
 
-    /// Point (y, z) of the wall at `chainage_m` and `arc_m` of the unscaled profile, displacements included; and the profile's
-    /// normal there, inwards.
+    /// Point (y, z) of the wall at `chainage_m` and at `arc_m` of the unscaled profile, and the profile's inward normal
+    /// there. The point includes displacements.
     pub(super) fn wall_place(&self, chainage_m: f64, arc_m: f64) -> (Yz, Yz) {
         let reference = self.profile.reference();
         let [wy, wz] = self.profile.point_at(arc_m);
@@ -188,8 +190,10 @@ impl Tube {
         (self.scaled(chainage_m, place), normal)
     }
 
-    /// Range along the unit vector `direction` (y, z) from a point of the section at `chainage_m` to the profile's wall,
-    /// without displacements; `None` from outside.
+    /// Range along the unit vector `direction` (y, z) from a point of the section at `chainage_m` to the profile's
+    /// wall, m.
+    ///
+    /// Ignores displacements. `None` if the point is outside the profile.
     pub(super) fn section_range_m(&self, chainage_m: f64, from: Yz, direction: Yz) -> Option<f64> {
         let scale = self.scale(chainage_m);
         let hit = self.profile.cast(self.unscaled(from, scale), direction.map(|c| c / scale))?;
@@ -202,8 +206,8 @@ impl Tube {
         self.stretches.get(number).is_some_and(|stretch| self.holds(stretch, point))
     }
 
-    /// Distance that the ray travels from `t_m` before it leaves the tube, at most to `far_m`; `None` if it isn't
-    /// inside.
+    /// Passage of the ray from `t_m` to the point where it leaves the tube, at most to `far_m`; `None` if the ray is
+    /// not in the tube at `t_m`.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, far_m: f64) -> Option<Passage> {
         let start = ray.at(t_m);
         let (mut number, start_m) = self.locate(start);
@@ -211,7 +215,7 @@ impl Tube {
         if !self.holds(first, start) {
             return None;
         }
-        // Along a straight line chainage is monotonic, so the direction at the beginning holds for all of it.
+        // Chainage is monotonic along a straight line, so the direction at the start holds for the whole ray.
         let [tx, ty] = first.piece.station(start_m).tangent;
         let forwards = ray.direction[0] * tx + ray.direction[1] * ty >= 0.0;
         let mut t_m = t_m;
@@ -233,7 +237,7 @@ impl Tube {
         None
     }
 
-    /// The wall's face at a point on it.
+    /// The wall's face at a point of the wall.
     pub(super) fn face(&self, point: V3) -> Face {
         let (number, chainage_m) = self.locate(point);
         let wall = Face { normal: [0.0; 3], feature: None };
@@ -252,7 +256,7 @@ impl Tube {
         }
     }
 
-    /// Stretch and chainage of a point.
+    /// Number of the stretch that holds a point, and the point's chainage.
     fn locate(&self, point: V3) -> (usize, f64) {
         let (_, chainage_m, _) = self.axis.locate([point[0], point[1]]);
         let after = self.stretches.partition_point(|stretch| stretch.from_m <= chainage_m);
@@ -274,8 +278,8 @@ impl Tube {
         stretch.mesh.and_then(|number| self.meshes.get(number))
     }
 
-    /// Where the ray leaves the tube between `t_m` and `until_m` within the stretch, with the face if a mesh is the
-    /// wall.
+    /// Range between `t_m` and `until_m` at which the ray leaves the tube within the stretch, with the face if a mesh
+    /// is the wall.
     fn leave_stretch(
         &self,
         stretch: &Stretch,
@@ -294,16 +298,17 @@ impl Tube {
         left.map(|t_m| (t_m, None))
     }
 
-    /// The face of the plane between two stretches at which the ray arrives, at `t_m`; `None` if there is water beyond.
+    /// Face of the plane between two stretches where the ray arrives at `t_m`; `None` if there is water beyond the
+    /// plane.
     ///
-    /// Only a mesh's end can be wall.
+    /// Only the end planes of a mesh can be wall.
     fn end_wall(&self, from: &Stretch, to: usize, ray: &Ray, t_m: f64) -> Option<Face> {
         let to = self.stretches.get(to)?;
         let mesh = self.mesh_of(to).or(self.mesh_of(from))?;
         if self.holds(to, ray.at(t_m)) {
             return None;
         }
-        // At a mesh the axis is straight.
+        // The axis is straight at a mesh.
         let [tx, ty] =
             if to.mesh.is_some() { to.piece.station(to.from_m) } else { from.piece.station(from.from_m) }
                 .tangent;
@@ -311,7 +316,7 @@ impl Tube {
         Some(Face { normal: [against * tx, against * ty, 0.0], feature: Some(mesh.feature()) })
     }
 
-    /// Closed form of leaving the tube, for a straight axis and a constant profile.
+    /// Range at which the ray leaves the tube, in closed form, for a straight axis and a constant profile.
     fn leave_plain(&self, stretch: &Stretch, ray: &Ray, t_m: f64) -> Option<f64> {
         let at = ray.at(t_m);
         let [tx, ty] = stretch.piece.station(0.0).tangent;
@@ -323,7 +328,7 @@ impl Tube {
         );
         match hit {
             Some(hit) => Some(t_m + hit.range_m),
-            // Only a point on the wall itself, or a ray along the axis, has no wall ahead.
+            // There is no wall ahead only for a point on the wall itself or a ray along the axis.
             None => (self.gauge(stretch, at) > 1.0 - 1e-9).then_some(t_m),
         }
     }
@@ -345,7 +350,7 @@ impl Tube {
         None
     }
 
-    /// Distance from the reference point over that of the wall in the same direction.
+    /// Distance of a point from the reference point, divided by the distance of the wall in the same direction.
     fn gauge(&self, stretch: &Stretch, point: V3) -> f64 {
         let plan = [point[0], point[1]];
         if stretch.is_constant() {
@@ -367,7 +372,8 @@ impl Tube {
         distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
     }
 
-    /// The profile's wall beyond an unscaled point, seen from the reference point; and its distance from there, m.
+    /// The profile's wall in the direction of an unscaled point from the reference point, and the distance from there
+    /// to the point, m.
     fn outwards(&self, unscaled: Yz) -> Option<(headrace_geometry::tunnel::WallHit, f64)> {
         let [ry, rz] = self.profile.reference();
         let out = [unscaled[0] - ry, unscaled[1] - rz];
@@ -377,7 +383,8 @@ impl Tube {
 
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     fn unscaled(&self, section: Yz, scale: f64) -> Yz {
-        // Otherwise the floor's position could cost a bit, and the plain case must equal the profile's own.
+        // Without this return, adding and subtracting the floor's position could cost a bit. The plain case must equal
+        // the profile exactly.
         if scale == 1.0 {
             return section;
         }
@@ -385,7 +392,7 @@ impl Tube {
         [fy + (section[0] - fy) / scale, fz + (section[1] - fz) / scale]
     }
 
-    /// The direction of steepest descent of the gauge, a unit vector.
+    /// Direction of steepest descent of the gauge, a unit vector.
     fn falling(&self, stretch: &Stretch, point: V3) -> V3 {
         let mut fall = [0.0; 3];
         for (k, fall) in fall.iter_mut().enumerate() {
@@ -397,7 +404,7 @@ impl Tube {
         unit(fall)
     }
 
-    /// The feature that displaces the wall most.
+    /// Number of the feature that displaces the wall most.
     fn displaced_by(&self, stretch: &Stretch, chainage_m: f64, arc_m: f64) -> Option<u16> {
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
@@ -409,12 +416,12 @@ impl Tube {
 }
 
 impl Stretch {
-    /// Whether all its sections are equal.
+    /// Whether all sections of the stretch are equal.
     fn is_constant(&self) -> bool {
         self.scale_slope_pm == 0.0 && self.bulges.is_empty()
     }
 
-    /// Whether it is a prism.
+    /// Whether the stretch is a prism: straight, with equal sections.
     fn is_plain(&self) -> bool {
         self.is_constant() && self.piece.curvature_pm() == 0.0
     }
@@ -430,7 +437,7 @@ impl Stretch {
         self.piece.chart([point[0], point[1]]).0
     }
 
-    /// Where the ray passes the plane across the end ahead, m; infinity if it never does.
+    /// Distance along the ray to the plane at the end ahead, m; infinity if the ray never passes the plane.
     fn end_m(&self, ray: &Ray, forwards: bool) -> f64 {
         let Some(end) = self.ends[usize::from(forwards)] else { return f64::INFINITY };
         let [tx, ty] = end.tangent;
@@ -442,7 +449,8 @@ impl Stretch {
     }
 }
 
-/// Root of a function between a point where it is negative and one where it isn't, by the Illinois method.
+/// Root of a function between a point with a negative value and a point with a non-negative value, by the Illinois
+/// method.
 fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) -> f64 {
     let mut kept = 0;
     for _ in 0..100 {
@@ -451,7 +459,7 @@ fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) ->
         }
         let t = below.0 - below.1 * (above.0 - below.0) / (above.1 - below.1);
         let value = f(t);
-        // An end kept twice counts half; otherwise the bracket would shrink from one side only.
+        // The value at an end that is kept twice is halved. Without that, the bracket would shrink from one side only.
         if value < 0.0 {
             below = (t, value);
             if kept == 1 {

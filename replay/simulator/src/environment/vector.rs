@@ -1,16 +1,16 @@
-//! Rays, and the vector operations for casting them.
+//! Rays, and vector operations for casting rays.
 
 use headrace_geometry::math;
 
 /// A position or direction in the tunnel's frame, m.
 pub(super) type V3 = [f64; 3];
 
-/// A ray in the tunnel's frame; its parameter t is metres when the direction has length one.
+/// A ray in the tunnel's frame. The parameter t is in metres if the direction has unit length.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
-    /// Its origin.
+    /// Origin.
     pub(super) origin: V3,
-    /// Its direction, a unit vector.
+    /// Direction.
     pub(super) direction: V3,
 }
 
@@ -36,7 +36,7 @@ pub(super) fn dot(a: V3, b: V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The unit vector of the same direction; zero stays zero.
+/// The unit vector of the same direction. A zero vector stays zero.
 pub(super) fn unit(a: V3) -> V3 {
     let length = math::sqrt(dot(a, a));
     if length > 0.0 { a.map(|c| c / length) } else { a }

@@ -6,19 +6,19 @@ use headrace_geometry::tunnel::Profile;
 const PLACES: u32 = 2_000;
 /// Factor on a half-width that allows for points between the samples.
 const WIDTH_MARGIN: f64 = 1.001;
-/// A floor counts as flat where it rises by less than this, m.
+/// Largest rise of a floor that counts as flat, m.
 const FLAT_M: f64 = 1e-3;
-/// The largest distance of the wall from the axis, to either side, m.
+/// Largest distance of the wall from the axis, to either side, m.
 pub(super) fn half_width_m(profile: &Profile) -> f64 {
     WIDTH_MARGIN * places(profile).map(|[y, _]| y.abs()).fold(0.0, f64::max)
 }
 
-/// Width of the floor, m: a quarter of the perimeter if it isn't flat.
+/// Width of the floor, m. For a curved floor, a quarter of the perimeter.
 pub(super) fn floor_m(profile: &Profile) -> f64 {
     flat_floor_m(profile).unwrap_or(profile.perimeter_m() / 4.0)
 }
 
-/// Width of a flat floor that extends about equally to either side of its centre, m; `None` if it is curved.
+/// Width of a flat floor that extends about equally to both sides of its centre, m; `None` if the floor is curved.
 pub(super) fn flat_floor_m(profile: &Profile) -> Option<f64> {
     let floor_m = profile.point_at(0.0)[1];
     let flat = |place: &[f64; 2]| place[1] < floor_m + FLAT_M;

@@ -2,16 +2,16 @@
 //!
 //! | model | effect | parameters | source |
 //! |---|---|---|---|
-//! | imagenex881 | beam_cone | the beam's width, as its frequency has it | the data sheet: 2.4 to 1.4 degrees |
-//! | | echo_strength | its own defaults | the data sheet |
+//! | imagenex881 | beam_cone | beam width at the head's frequency | the data sheet: 2.4 to 1.4 degrees |
+//! | | echo_strength | the effect's defaults | the data sheet |
 //! | | range_quantisation | 500 points | the switch command, field 19; Jorge et al. 2021, §9.2 |
 //! | | range_noise | 10 mm | field.md, "data sheet" |
 //! | ping1d | beam_cone | 30 degrees | the data sheet: 0.52 rad |
 //! | | range_noise, outliers, missing_returns | 20 mm; 8 %; 5 % in runs of 8 | field.md, "data sheet" |
 //! | bar100 | depth_steps, depth_noise | 31.2 mm; a count of 305 Pa / 2 | the data sheet: 3.05 mbar; resolution 3 mbar |
-//! | those with a known noise | imu_noise, imu_bias | the device's own figures | its crate, by [`Device::inertial_noise`] |
+//! | models with known noise | imu_noise, imu_bias | the device's own figures | the device's crate, through [`Device::inertial_noise`] |
 //!
-//! A head implies further effects by being on a vehicle: see [`of_vehicle`].
+//! A head on a vehicle implies further effects: see [`of_vehicle`].
 //!
 //! [`Device::inertial_noise`]: headrace_sensor::device::Device::inertial_noise
 
@@ -21,10 +21,10 @@ use headrace_vehicle::VehicleConfig;
 use super::{Call, number};
 use crate::facts::{Facts, SensorFacts};
 
-/// Heads whose beam widths differ by less than this share a frequency, radians. It corresponds to 5 kHz.
+/// Largest difference in beam width between heads of one frequency, radians. It corresponds to 5 kHz.
 const SAME_BEAM_RAD: f64 = 2e-4;
 
-/// Effects implied by the vehicle's sensors, each by its model.
+/// Effects implied by the models of the vehicle's sensors.
 pub(super) fn calls(vehicle: &VehicleConfig, facts: &Facts) -> Vec<Call> {
     let mut calls = of_vehicle(vehicle, facts);
     let models = vehicle.sensor_configs.iter().map(|config| config.plugin.as_str());
@@ -94,7 +94,7 @@ fn inertial(noise: &InertialNoise) -> Own {
     ]
 }
 
-/// Effects implied by heads on a moving vehicle, beside other heads and the hull.
+/// Effects implied by heads on a moving vehicle, and by heads near other heads or the hull.
 fn of_vehicle(vehicle: &VehicleConfig, facts: &Facts) -> Vec<Call> {
     let heads: Vec<&SensorFacts> = facts.sensors.iter().filter(|sensor| sensor.head.is_some()).collect();
     let ids = |sensors: &[&SensorFacts]| sensors.iter().map(|sensor| sensor.id.clone()).collect::<Vec<_>>();

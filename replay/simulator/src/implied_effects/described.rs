@@ -27,10 +27,10 @@ const CABLES: [Cable; 1] = [Cable { name: "fathom", diameter_m: 0.0076, strength
 const ARAMID_STRAIN: f64 = 0.036;
 const FRICTION: f64 = 0.01;
 const DRAWN_MPS: f64 = 0.2;
-/// Length of water on either side of an opening in which corners return sound by way of two walls, m.
+/// Distance on either side of an opening within which its corners cause double reflections, m.
 const BESIDE_M: f64 = 1.0;
-/// Length over which the end of a steel lining disturbs a compass, m, and the largest disturbance, degrees, as in the
-/// scene steel.toml.
+/// Length over which the end of a steel lining disturbs a compass, m, and the largest disturbance, degrees. Values of
+/// the scene steel.toml.
 const STEEL_END_M: f64 = 6.0;
 const STEEL_END_DEG: f64 = 10.0;
 
@@ -54,12 +54,12 @@ struct Murk {
     grain_um: f64,
 }
 
-/// A leak: a flow out of the tunnel, or into it if negative.
+/// A leak: a flow out of the tunnel, or into the tunnel if negative.
 #[derive(Debug, Clone, Copy)]
 struct Leak {
     chainage_m: f64,
     flow_m3ps: f64,
-    /// Whether the water comes from the portal rather than from the tunnel's far end.
+    /// Whether the water comes from the portal rather than from the far end of the tunnel.
     from_portal: bool,
 }
 
@@ -94,9 +94,9 @@ pub(crate) struct Tables<'a> {
 }
 
 impl<'a> Tables<'a> {
-    /// The tables `[water]`, `[cable]`, `[thrusters]` and the stretches of `[tunnel]`.
+    /// Finds the tables `[water]`, `[cable]` and `[thrusters]`, and the stretches in `[tunnel]`.
     ///
-    /// Errors: one of them isn't a table.
+    /// Errors: one of them is not a table.
     pub(crate) fn of(root: &Section<'a>, tunnel: Option<&Section<'a>>) -> Result<Self, ConfigError> {
         let stretches = tunnel.map(|tunnel| tunnel.sections("stretches")).transpose()?;
         Ok(Self {
@@ -111,7 +111,7 @@ impl<'a> Tables<'a> {
 impl Described {
     /// Reads the tables of a scene whose tunnel is `length_m` long.
     ///
-    /// Errors: a key that is missing, unknown or out of range; linings that overlap.
+    /// Errors: a key is missing, unknown or out of range, or linings overlap.
     pub(crate) fn read(tables: Tables<'_>, length_m: f64) -> Result<Self, ConfigError> {
         let mut described = Self::default();
         if let Some(water) = tables.water {
@@ -207,7 +207,7 @@ impl Described {
             let place_m = [murk.stretch.from_m, murk.stretch.to_m];
             let by = format!("murk of {} g/l from {} to {} m", murk.silt_gpl, place_m[0], place_m[1]);
             let call = |effect, keys: &[_]| Call::new(effect, by.clone(), keys).within(place_m);
-            // field.md, "murk": runs of lost returns, 5 % near returns, second echoes.
+            // Values from field.md, "murk": runs of lost returns, 5 % near returns, second echoes.
             let lost = [("share", number(0.2)), ("mean_run", number(6.0))];
             let near = [("share", number(0.05)), ("mean_run", number(3.0))];
             let silt = [("silt_gpl", number(murk.silt_gpl)), ("grain_um", number(murk.grain_um))];
@@ -222,7 +222,7 @@ impl Described {
     }
 
     fn of_leaks(&self, facts: &Facts, environment: &Environment) -> Vec<Call> {
-        // A current doesn't carry a vehicle whose trajectory is given over ground.
+        // A current does not carry a vehicle with a trajectory given over ground.
         if self.leaks.is_empty() || facts.ground == Ground::Tunnel {
             return Vec::new();
         }
@@ -248,7 +248,7 @@ fn within(table: &Section<'_>, length_m: f64) -> Result<Stretch, ConfigError> {
     Ok(stretch)
 }
 
-/// At openings, corners return sound by way of two walls.
+/// Double reflections at the corners of openings.
 fn openings(environment: &Environment, sonars: &[String], length_m: f64) -> Vec<Call> {
     let by_opening = |(name, [from_m, to_m]): (&str, [f64; 2])| {
         let place_m = [(from_m - BESIDE_M).max(0.0), (to_m + BESIDE_M).min(length_m)];
@@ -258,7 +258,7 @@ fn openings(environment: &Environment, sonars: &[String], length_m: f64) -> Vec<
     environment.openings().map(by_opening).collect()
 }
 
-/// Beside rubble, a beam hits stones and the wall behind them.
+/// Wide beams near rubble, which hit both stones and the wall behind them.
 fn rubble(environment: &Environment, sonars: &[String]) -> Option<Call> {
     let [from_m, to_m] = environment.rubble_m()?;
     let by = format!("rubble from {from_m:.1} to {to_m:.1} m");
@@ -268,9 +268,9 @@ fn rubble(environment: &Environment, sonars: &[String]) -> Option<Call> {
 impl Lining {
     /// Adds the effects of a lining.
     ///
-    /// Smooth walls return little sound except at perpendicular incidence, and more by indirect paths. The ends of
-    /// steel disturb compasses. Shares are those of the scene steel.toml. The backscatter relative to rough rock is
-    /// from Urick, "Principles of underwater sound", ch. 8 (smooth bottoms are 10 to 20 dB below rock).
+    /// A smooth wall returns little sound except at perpendicular incidence, and more sound by indirect paths. The ends
+    /// of a steel lining disturb compasses. Shares are those of the scene steel.toml. The backscatter relative to rough
+    /// rock is from Urick, "Principles of underwater sound", ch. 8 (smooth bottoms are 10 to 20 dB below rock).
     fn call(self, stretch: Stretch, [heads, sonars, units]: [&[String]; 3], calls: &mut Vec<Call>) {
         let (name, wall_db, share) = match self {
             Self::Rock => return,

@@ -1,28 +1,29 @@
-//! Merges many calls for effects into one set of tables. If two calls for an effect overlap, the later one's keys
-//! apply.
+//! Merges many calls for effects into one set of tables. Where two calls for an effect overlap, the keys of the later
+//! call apply.
 
 use super::{Call, Called, Fate, Value};
 use crate::effects::KINDS;
 
-/// Key whose values are concatenated instead of replaced by the later call's.
+/// Key with a list as its value. Lists of several calls are concatenated; for other keys the later call's value
+/// applies.
 const PLACES: &str = "places";
 
-/// Effect whose tables are groups of sensors.
+/// Effect with one table per group of sensors.
 const GROUPED: &str = "interference";
 
 type Keys = Vec<(&'static str, Value)>;
 
-/// Sensors with the same pieces and, for grouped effects, the group of sensors.
+/// Sensors with the same pieces. For [`GROUPED`], also the group of sensors.
 type Shared<'a> = (Vec<&'a String>, Vec<Piece>, Option<Option<&'a Vec<String>>>);
 
-/// A table to write: its place and its content.
+/// A table to write: the range of chainage where it applies, and its keys.
 #[derive(Debug, Clone, PartialEq)]
 struct Piece {
     place_m: [f64; 2],
     keys: Keys,
 }
 
-/// Merges the calls by effect.
+/// Merges the calls for each effect.
 pub(super) fn merge(calls: &[Call]) -> Vec<Called> {
     let mut all = Vec::new();
     for kind in KINDS {
@@ -46,7 +47,7 @@ pub(super) fn merge(calls: &[Call]) -> Vec<Called> {
     all
 }
 
-/// The effect's tables. Sensors with the same pieces share them.
+/// The tables of an effect. Sensors with the same pieces share tables.
 fn tables(effect: &str, calls: &[&Call]) -> String {
     let mut sensors: Vec<Option<&String>> = Vec::new();
     for call in calls {
@@ -66,7 +67,7 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
         };
         let acting: Vec<&Call> = calls.iter().filter(acts).copied().collect();
         let pieces = pieces(&acting);
-        // For heads that hear each other a table is a frequency, so two calls give two tables.
+        // A table of this effect lists the heads of one frequency, so two calls give two tables.
         let group = acting.first().filter(|_| effect == GROUPED).map(|call| call.sensors.as_ref());
         match shared.iter_mut().find(|(_, other, of)| *other == pieces && *of == group) {
             Some((ids, ..)) => ids.extend(sensor),
@@ -82,7 +83,8 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
     text
 }
 
-/// The places in which different sets of calls apply, in order. Places without any call are left out.
+/// Divides the tunnel into ranges of chainage in which the same calls apply, in order. Ranges without calls are left
+/// out.
 fn pieces(calls: &[&Call]) -> Vec<Piece> {
     const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
     let place = |call: &Call| call.place_m.unwrap_or(ALL);

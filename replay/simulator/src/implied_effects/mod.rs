@@ -1,7 +1,7 @@
-//! Effects implied by a scene's descriptions, with their places and parameters from data sheets.
+//! Effects implied by a scene's descriptions, with their ranges of chainage and with parameters from data sheets.
 //!
 //! A lining, silt, a leak, rubble, thrusters, a cable and the models of sensors each imply effects. The key `take` of
-//! `[effects]` decides whether they are simulated.
+//! `[effects]` decides whether implied effects are simulated.
 
 mod data_sheets;
 mod described;
@@ -18,23 +18,23 @@ pub(crate) use described::{Described, Tables};
 /// Selects which of the implied effects are simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Take {
-    /// Only the effects that the scene names.
+    /// Simulates only the effects that the scene names.
     #[default]
     Only,
-    /// Implied effects as well; an effect that the scene names is simulated as named.
+    /// Simulates implied effects too. An effect that the scene names is simulated with the scene's own tables.
     Called,
 }
 
 /// An effect that a scene implies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Called {
-    /// Its name.
+    /// Name of the effect.
     pub effect: &'static str,
-    /// The parts of the scene or its vehicle file that imply it.
+    /// Parts of the scene or its vehicle file that imply the effect.
     pub by: Vec<String>,
-    /// Its tables, as they would be written in the scene.
+    /// Tables of the effect, in the form in which a scene would contain them.
     pub tables: String,
-    /// Whether and how it is simulated.
+    /// Whether and how the effect is simulated.
     pub fate: Fate,
 }
 
@@ -43,16 +43,16 @@ pub struct Called {
 pub enum Fate {
     /// Simulated as implied.
     Taken,
-    /// It is simulated as the scene names it.
+    /// Simulated with the tables in the scene.
     Named,
-    /// Not simulated: the scene takes only named effects.
+    /// Not simulated: the scene asks only for named effects.
     NotTaken,
-    /// Not simulated: `leave` lists it.
+    /// Not simulated: the key `leave` lists the effect.
     Left,
 }
 
 impl Fate {
-    /// Its display text.
+    /// The fate as text for display.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Taken => "taken",
@@ -66,14 +66,14 @@ impl Fate {
 /// A value of an effect's key, as TOML.
 type Value = String;
 
-/// A single call for an effect.
+/// One reason for an effect, with the sensors, the range of chainage and the keys that follow from it.
 #[derive(Debug, Clone, PartialEq)]
 struct Call {
     effect: &'static str,
     by: String,
-    /// Sensors that it acts on; `None` for an effect on the vehicle or the water.
+    /// Sensors that the effect acts on; `None` for an effect on the vehicle or the water.
     sensors: Option<Vec<String>>,
-    /// Chainages between which it acts; `None` for everywhere.
+    /// Chainages between which the effect acts; `None` if it acts everywhere.
     place_m: Option<[f64; 2]>,
     keys: Vec<(&'static str, Value)>,
 }
@@ -92,7 +92,7 @@ impl Call {
     }
 }
 
-/// A number as TOML.
+/// Formats a number as TOML.
 fn number(value: f64) -> Value {
     format!("{value:?}")
 }
@@ -109,7 +109,7 @@ pub(crate) fn called(
     merge::merge(&calls)
 }
 
-/// The keys of `[effects]` other than effects.
+/// The keys of `[effects]` that are not names of effects.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Choice {
     pub(crate) take: Take,
@@ -117,9 +117,10 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
-    /// Reads `take` and `leave`; `instead` overrides the value of `take`.
+    /// Reads `take` and `leave`. `instead` overrides the value of `take`.
     ///
-    /// Errors: another value; `leave` without `take = "called"`; a name that isn't an effect.
+    /// Errors: `take` has an unknown value, `leave` is given without `take = "called"`, or `leave` lists a name that is
+    /// not an effect.
     pub(crate) fn read(effects: Option<&Section<'_>>, instead: Option<Take>) -> Result<Self, ConfigError> {
         let Some(section) = effects else {
             return Ok(Self { take: instead.unwrap_or_default(), leave: Vec::new() });
@@ -137,7 +138,8 @@ impl Choice {
         Ok(Self { take: instead.unwrap_or(take), leave })
     }
 
-    /// Sets for each call whether and how it is simulated. `is_named` tells which effects the scene names itself.
+    /// Sets for each implied effect whether and how it is simulated. `is_named` tells whether the scene names an
+    /// effect.
     pub(crate) fn decide(&self, called: &mut [Called], is_named: impl Fn(&str) -> bool) {
         for call in called {
             call.fate = match self.take {
@@ -150,7 +152,7 @@ impl Choice {
     }
 }
 
-/// The tables of all taken effects, as text to parse.
+/// The tables of all implied effects that are simulated, as text to parse.
 pub(crate) fn taken(called: &[Called]) -> String {
     let taken = called.iter().filter(|call| call.fate == Fate::Taken);
     taken.map(|call| call.tables.as_str()).collect::<Vec<_>>().concat()

@@ -32,7 +32,7 @@ fn implied_effects_are_taken_only_if_the_scene_says_so() {
     assert!(fates(MURK).iter().all(|(_, fate)| *fate == Fate::NotTaken));
 }
 
-/// The displayed tables are those that act: named in the scene, they give the same bytes.
+/// The displayed tables are equivalent to the implied effects: copied into the scene, they give the same bytes.
 #[test]
 fn implied_effects_act_like_named_ones() {
     let called = format!("{MURK}[effects]\ntake = \"called\"\n");
@@ -86,7 +86,7 @@ fn each_description_implies_its_effects() {
         let found: Vec<&str> = effects(text).into_iter().filter(|effect| !bare.contains(effect)).collect();
         assert_eq!(found, more, "{text}");
     }
-    // A leak's current: half a cubic metre per second through a rectangle of 6 by 5 m.
+    // The current of a leak is half a cubic metre per second through a rectangle of 6 m by 5 m.
     let scene = dive().scene("[water]\n[[water.leaks]]\nchainage_m = 20\nflow_m3ps = 0.5").unwrap();
     let current = scene.called().iter().find(|call| call.effect == "current").unwrap();
     let speed_mps: f64 =
@@ -109,7 +109,7 @@ fn named_effects_override_implied_ones_and_leave_omits_them() {
 }
 
 #[test]
-fn effect_left_out_acts_like_one_that_is_not_named() {
+fn omitted_effect_acts_like_an_unnamed_one() {
     let both = "[effects]\nrange_noise = { sd_m = 0.2 }\nmissing_returns = { share = 0.2 }\n";
     let mut scene = dive().scene(both).unwrap();
     scene.leave_out(&["range_noise"]);

@@ -1,4 +1,5 @@
-//! Builds a surface of triangles: welds coinciding vertices and checks that it is closed where it must be.
+//! Builds a surface of triangles: welds coinciding vertices and checks that the surface is closed where its role
+//! requires it.
 
 use std::collections::BTreeMap;
 
@@ -10,29 +11,30 @@ use super::ply::Triangles;
 /// Role of a mesh in a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// The tunnel's wall over the mesh's own extent along x, open at both ends and closed elsewhere.
+    /// The tunnel's wall over the extent of the mesh along x, open at both ends and closed in between.
     Wall,
     /// A closed solid in the water.
     Body,
 }
 
-/// Largest allowed coordinate, metres; beyond it, units or origin are wrong.
+/// Largest allowed coordinate, metres. A larger coordinate indicates a wrong unit or origin.
 const FAR_M: f64 = 100_000.0;
-/// Vertices closer than this share of the mesh's diagonal are welded.
+/// Largest distance between welded vertices, as a share of the mesh's diagonal.
 const WELD: f64 = 1e-9;
-/// A wall's opening lies within this share of its length from an end, or within [`END_M`].
+/// Largest distance of a wall's opening from an end, as a share of the wall's length. [`END_M`] applies if it is
+/// larger.
 const END: f64 = 0.02;
-/// As [`END`], in metres. The result is at most a quarter of the length, so that the ends stay apart.
+/// Alternative to [`END`], metres. Either distance is limited to a quarter of the length, which keeps the ends apart.
 const END_M: f64 = 0.5;
 
-/// A surface that has been checked.
+/// A checked surface.
 #[derive(Debug, Clone)]
 pub(super) struct Surface {
     pub(super) vertices: Vec<[f64; 3]>,
     pub(super) faces: Vec<[u32; 3]>,
     /// Number of each face in the input.
     pub(super) given: Vec<u32>,
-    /// Caps that close a wall's openings.
+    /// Caps that close the openings of a wall.
     pub(super) caps: Vec<Cap>,
     pub(super) low: [f64; 3],
     pub(super) high: [f64; 3],
@@ -46,7 +48,7 @@ pub(super) struct Cap {
     pub(super) high: [f64; 3],
 }
 
-/// An opening: connected edges that belong to only one face.
+/// An opening: connected edges that belong to only one face each.
 struct Hole {
     edges: Vec<[u32; 2]>,
     low_x: f64,
@@ -54,7 +56,7 @@ struct Hole {
 }
 
 impl Surface {
-    /// Welds and checks; drops triangles with two corners in one place.
+    /// Welds vertices, drops triangles with two coinciding corners, and checks the surface.
     pub(super) fn new(triangles: Triangles, role: Role) -> Result<Self, MeshError> {
         let Triangles { mut vertices, faces } = triangles;
         numbers(&vertices, &faces)?;
@@ -98,7 +100,7 @@ impl Surface {
     }
 }
 
-/// Checks counts, corner numbers and coordinates.
+/// Checks the number of elements, the corner numbers and the coordinates.
 fn numbers(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<(), MeshError> {
     for (what, given) in [("vertices", vertices.len()), ("faces", faces.len())] {
         if u32::try_from(given).is_err() {
@@ -118,7 +120,7 @@ fn numbers(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// Bounding box of the corners of faces; vertices that no face uses don't count.
+/// Bounding box of the corners of faces. Vertices without a face are ignored.
 fn bounds(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> ([f64; 3], [f64; 3]) {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];
@@ -137,10 +139,11 @@ pub(super) fn diagonal(low: [f64; 3], high: [f64; 3]) -> f64 {
     math::sqrt(x * x + y * y + z * z)
 }
 
-/// For each vertex, the first one within welding distance.
+/// For each vertex, the number of the first vertex within welding distance.
 fn weld(vertices: &[[f64; 3]], low: [f64; 3], diagonal: f64) -> Vec<u32> {
     let near = (WELD * diagonal).max(f64::MIN_POSITIVE);
-    // Cells are several times that wide: most vertices search only one cell, and no cell holds many vertices.
+    // A cell is several times as wide as the welding distance. Most vertices therefore search only one cell, and no
+    // cell holds many vertices.
     let cell = 8.0 * near;
     let mut cells: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     let mut welded = Vec::with_capacity(vertices.len());
@@ -186,7 +189,7 @@ fn open_edges(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<Vec<[u32; 2]>
 
 /// Sorts open edges into holes, in the order of their first edges.
 fn holes(vertices: &[[f64; 3]], open: &[[u32; 2]]) -> Vec<Hole> {
-    // Union-find over the vertices of open edges; the smallest number of each set is its root.
+    // Union-find over the vertices of open edges. The smallest number in each set is the root of the set.
     let mut parent: BTreeMap<u32, u32> = open.as_flattened().iter().map(|&v| (v, v)).collect();
     let mut root = |mut v: u32, w: Option<u32>| {
         let mut path = Vec::new();
@@ -222,7 +225,7 @@ fn holes(vertices: &[[f64; 3]], open: &[[u32; 2]]) -> Vec<Hole> {
 
 /// Returns an error if there is any hole.
 fn refuse(vertices: &[[f64; 3]], holes: &[&Hole]) -> Result<(), MeshError> {
-    // Of several equally large holes, the first one.
+    // The first hole counts if several are equally large.
     let Some(largest) = holes.iter().rev().max_by_key(|hole| hole.edges.len()) else {
         return Ok(());
     };
@@ -230,7 +233,7 @@ fn refuse(vertices: &[[f64; 3]], holes: &[&Hole]) -> Result<(), MeshError> {
     Err(MeshError::Hole { holes: holes.len(), edges: largest.edges.len(), at })
 }
 
-/// Checks that a wall has openings at both ends, and no others.
+/// Checks that a wall has openings at both ends and nowhere else.
 fn ends(vertices: &[[f64; 3]], holes: &[Hole], low_x: f64, high_x: f64) -> Result<(), MeshError> {
     let length = high_x - low_x;
     let within_m = (END * length).max(END_M).min(length / 4.0);
@@ -247,9 +250,9 @@ fn ends(vertices: &[[f64; 3]], holes: &[Hole], low_x: f64, high_x: f64) -> Resul
     Ok(())
 }
 
-/// Closes a hole by triangles from the centroid of its rim vertices to each edge.
+/// Closes a hole by triangles from the centroid of the rim vertices to each edge.
 ///
-/// Whatever the hole's shape, each of its edges then has two faces, and the inside is defined.
+/// Each edge of the hole then has two faces, whatever the hole's shape. The inside is therefore defined.
 fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Cap {
     let mut middle = [0.0; 3];
     for &corner in hole.edges.as_flattened() {
@@ -260,7 +263,7 @@ fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Cap {
     let middle = middle.map(|sum| sum / (2 * hole.edges.len()) as f64);
     let triangle = |&[a, b]: &[u32; 2]| [vertices[a as usize], vertices[b as usize], middle];
     let triangles: Vec<_> = hole.edges.iter().map(triangle).collect();
-    // The centroid is within the edges' bounding box.
+    // The centroid lies within the bounding box of the edges.
     let (mut low, mut high) = (middle, middle);
     for corner in triangles.as_flattened() {
         for k in 0..3 {

@@ -2,73 +2,73 @@
 
 use core::fmt;
 
-/// Why a mesh can't be used. Positions are in the file's own axes.
+/// A reason why a mesh cannot be used. Positions are in the file's own axes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// The file can't be read as PLY.
+    /// The file cannot be read as PLY.
     #[error("reading PLY: {0}")]
     File(String),
-    /// The mesh has no triangle left.
+    /// No triangle is left in the mesh.
     #[error("the mesh has no face ({given} given; those with two corners in one place don't count)")]
     NoFaces {
-        /// Number of triangles given, each with two corners in one place.
+        /// Number of triangles in the input. Each has two coinciding corners.
         given: usize,
     },
-    /// More elements than 32 bits can number.
+    /// There are more elements than 32 bits can number.
     #[error("the mesh has {given} {what}; at most {} can be numbered", u32::MAX)]
     TooMany {
         /// Kind of element.
         what: &'static str,
-        /// Their number.
+        /// Number of elements.
         given: usize,
     },
-    /// A triangle refers to a vertex that doesn't exist.
+    /// A triangle refers to a vertex that does not exist.
     #[error("face {face} has vertex {vertex} as a corner, of {vertices} vertices (both counted from 0)")]
     NoSuchVertex {
         /// Number of the face.
         face: usize,
-        /// The corner.
+        /// Number of the missing vertex.
         vertex: u32,
         /// Number of vertices.
         vertices: usize,
     },
-    /// A vertex whose coordinates aren't finite or are too large.
+    /// The coordinates of a vertex are not finite or too large.
     #[error("vertex {vertex} (counted from 0) is at {}; coordinates must be finite and within 100 km of 0", At(*at))]
     FarVertex {
         /// Number of the vertex.
         vertex: usize,
-        /// Its coordinates, metres.
+        /// Coordinates of the vertex, metres.
         at: [f64; 3],
     },
-    /// More than two triangles meet at an edge, so that no side is inside.
+    /// More than two triangles meet at an edge, so the inside is undefined.
     #[error("{faces} faces share the edge from {} to {}; at most 2 may", At(*from), At(*to))]
     NonManifold {
         /// One end of the edge, metres.
         from: [f64; 3],
-        /// The other end, metres.
+        /// The other end of the edge, metres.
         to: [f64; 3],
-        /// Faces that have this edge.
+        /// Number of faces at the edge.
         faces: usize,
     },
-    /// A body isn't closed, or a wall is open elsewhere than at its ends.
+    /// A body is not closed, or a wall is open between its ends.
     #[error("the mesh has {holes} hole(s) where it must be closed; the largest has {edges} edges, one of them at {}", At(*at))]
     Hole {
-        /// Number of holes, except a wall's open ends.
+        /// Number of holes, without the open ends of a wall.
         holes: usize,
-        /// Edges around the largest.
+        /// Number of edges around the largest hole.
         edges: usize,
-        /// A vertex on its rim, metres.
+        /// A vertex on the rim of the largest hole, metres.
         at: [f64; 3],
     },
-    /// A wall must be open at both ends.
+    /// An end of a wall is closed.
     #[error(
         "the wall is closed at its end at x = {x_m:.3} m; it must have an opening within {within_m:.3} m of it"
     )]
     ClosedEnd {
-        /// Where the mesh ends, metres.
+        /// x-coordinate of the end of the mesh, metres.
         x_m: f64,
-        /// Distance from there within which all vertices of an opening must lie, metres.
+        /// Largest allowed distance from the end to the vertices of an opening, metres.
         within_m: f64,
     },
 }

@@ -1,16 +1,16 @@
 //! Intersects a ray with a box and with a triangle, without gaps between triangles.
 //!
 //! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. The side of the ray
-//! on which an edge passes is the sign of a difference of two products. Rounding keeps their order, and swapping the
-//! ends changes only the sign. The two triangles of an edge therefore agree, or both find zero, which counts as inside:
-//! no ray passes between them.
+//! on which an edge passes is the sign of a difference of two products. Rounding keeps the order of the products, and
+//! swapping the ends of the edge changes only the sign. Two triangles with a common edge therefore agree on the side,
+//! or both find zero, which counts as inside. No ray passes between the two triangles.
 
 use headrace_geometry::math;
 
-/// Threshold below which rounding dominates the position in a triangle (seen edge-on, or a needle). A few thousand
-/// units in the last place.
+/// Relative size of a triangle's area, seen along the ray, below which rounding errors dominate. Such a triangle is a
+/// needle or is seen edge-on. The value is a few thousand units in the last place.
 const THIN: f64 = 1e-12;
-/// Widens the interval of a box by more than its rounding error.
+/// Factor that widens the interval of a box by more than its rounding error.
 const WIDER: f64 = 1.0 + 1e-15;
 
 /// Result of the crossing test of a ray and a triangle, with ambiguous cases kept apart.
@@ -18,33 +18,33 @@ const WIDER: f64 = 1.0 + 1e-15;
 pub(super) enum Crossing {
     Beside,
     Through,
-    /// Through an edge or a corner, or along the face.
+    /// The ray passes through an edge or a corner, or along the face.
     Unclear,
 }
 
-/// A ray, prepared.
+/// A ray with precomputed values for intersections.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
     origin: [f64; 3],
     inverse: [f64; 3],
-    /// The axes, ordered so that the one nearest to the ray's direction is last.
+    /// The axes in such an order that the axis nearest to the ray's direction is last.
     axes: [usize; 3],
-    /// Shear that turns the ray into the last axis: subtracted from the first two coordinates per unit of the last; and the
-    /// scale of the last.
+    /// Shear that maps the ray onto the last axis: amounts subtracted from the first two coordinates per unit of the
+    /// last, and the scale of the last coordinate.
     shear: [f64; 3],
     far: f64,
 }
 
-/// Doubled areas of the parts into which the ray's point divides a triangle, seen along the ray.
+/// A triangle seen along the ray, with twice the areas of the three parts into which the ray divides the triangle.
 struct Parts {
     corners: [[f64; 3]; 3],
     areas: [f64; 3],
 }
 
 impl Ray {
-    /// Prepares a ray from an origin and a direction of any length, up to `far` times that length.
+    /// Prepares a ray from an origin and a direction of any length. The ray ends at `far` times that length.
     ///
-    /// A direction that is zero or not finite meets nothing.
+    /// A ray hits nothing if its direction is zero or not finite.
     pub(super) fn new(origin: [f64; 3], direction: [f64; 3], far: f64) -> Self {
         let [x, y, z] = direction.map(f64::abs);
         let axes = if z >= x && z >= y {
@@ -59,9 +59,9 @@ impl Ray {
         Self { origin, inverse: direction.map(|d| 1.0 / d), axes, shear, far }
     }
 
-    /// Lower bound of the range at which the ray enters a box; infinite if it misses the box.
+    /// Lower bound of the range at which the ray enters a box; infinite if the ray misses the box.
     ///
-    /// Comparisons are written so that NaN, from zero times infinity, bounds nothing.
+    /// A NaN, from zero times infinity, leaves the bound unchanged.
     pub(super) fn enters(&self, low: [f64; 3], high: [f64; 3]) -> f64 {
         let mut near = 0.0;
         let mut far = self.far;
@@ -76,7 +76,8 @@ impl Ray {
                 far = last;
             }
         }
-        // The bound is below any hit in the box, even at 0, so that a second hit at the same range is tested.
+        // The bound is below any hit in the box, even at range 0. A second hit at the same range is therefore tested
+        // too.
         if near <= far * WIDER { near / WIDER / WIDER - f64::MIN_POSITIVE } else { f64::INFINITY }
     }
 
@@ -91,7 +92,7 @@ impl Ray {
         Parts { corners, areas: [area(b, c), area(c, a), area(a, b)] }
     }
 
-    /// The range at which the ray meets a triangle, from either side, its edges included.
+    /// The range at which the ray hits a triangle, from either side. The edges belong to the triangle.
     pub(super) fn hits(&self, triangle: [[f64; 3]; 3]) -> Option<f64> {
         let parts = self.parts(triangle);
         let [u, v, w] = parts.areas;
@@ -102,7 +103,7 @@ impl Ray {
         (range >= 0.0 && range <= self.far).then_some(range)
     }
 
-    /// Whether the ray crosses a triangle's interior.
+    /// Whether the ray crosses the interior of a triangle.
     pub(super) fn crosses(&self, triangle: [[f64; 3]; 3]) -> Crossing {
         let parts = self.parts(triangle);
         let [u, v, w] = parts.areas;
@@ -136,7 +137,7 @@ impl Parts {
         if whole.abs() > THIN * wide * deep {
             return Some((u * a[2] + v * b[2] + w * c[2]) / whole);
         }
-        // The areas are rounding errors. The triangle is nearly a line, so its longest side gives the position.
+        // The areas are mere rounding errors. The triangle is nearly a line, so the longest side gives the depth.
         let side = |p: [f64; 3], q: [f64; 3]| {
             let (x, y) = (q[0] - p[0], q[1] - p[1]);
             let square = x * x + y * y;
@@ -154,8 +155,8 @@ impl Parts {
     }
 }
 
-/// The unit normal of a triangle on the side from which a ray of this direction comes. For a triangle without area it
-/// faces the ray.
+/// The unit normal of a triangle, on the side from which a ray of this direction comes. For a triangle without area,
+/// the normal points against the ray.
 pub(super) fn normal_against(triangle: [[f64; 3]; 3], direction: [f64; 3]) -> [f64; 3] {
     let [a, b, c] = triangle;
     let normal = cross(minus(b, a), minus(c, a));

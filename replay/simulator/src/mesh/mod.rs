@@ -1,7 +1,7 @@
-//! Triangle meshes for the simulator, from PLY files: a stretch of a tunnel's wall, or a body in the water.
+//! Triangle meshes from PLY files for the simulator: a stretch of the tunnel's wall, or a body in the water.
 //!
-//! A mesh is checked when it is made, so that a ray from inside can't leave through a gap between triangles. The winding of
-//! the triangles doesn't matter.
+//! The constructor checks that no ray from inside can leave through a gap between triangles. The winding of the
+//! triangles does not matter.
 
 mod check;
 mod error;
@@ -30,12 +30,13 @@ pub use ply::{Triangles, read};
 
 /// Margin of the tree's boxes around their contents, as a share of the mesh's size.
 ///
-/// It exceeds the rounding error of a triangle seen from up to a thousand times that distance.
+/// The margin exceeds the rounding error for a triangle seen from a distance of up to a thousand times the mesh's size.
 const SLACK: f64 = 1e-12;
 
 /// Directions of the rays that test whether a point is inside.
 ///
-/// They avoid axes and planes that meshes are likely to have, and point mostly across the tunnel, where it is short.
+/// The directions avoid the axes and planes that are likely in meshes. They point mostly across the tunnel, where a ray
+/// is short.
 const WAYS_OUT: [[f64; 3]; 6] = [
     [0.137, 0.811, 0.573],
     [-0.219, -0.547, 0.829],
@@ -45,18 +46,18 @@ const WAYS_OUT: [[f64; 3]; 6] = [
     [-0.701, 0.613, -0.367],
 ];
 
-/// Where a ray meets a mesh.
+/// The point where a ray hits a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshHit {
     /// Distance from the ray's origin, metres.
     pub range_m: f64,
     /// Unit normal of the face, on the side from which the ray comes.
     pub normal: [f64; 3],
-    /// Number of the face in the input; the smallest if the ray meets several at one point.
+    /// Number of the face in the input. The smallest number if the ray hits several faces at one point.
     pub face: u32,
 }
 
-/// A checked surface of triangles, ready for rays. Its frame is that of the input, metres.
+/// A checked surface of triangles, with a tree for casting rays. Its coordinates are those of the input, metres.
 #[derive(Debug, Clone)]
 pub struct Mesh {
     surface: Surface,
@@ -67,12 +68,12 @@ impl Mesh {
     /// Checks triangles and builds the tree for casting rays.
     ///
     /// Vertices closer than 1e-9 of the mesh's size are welded, and triangles with two corners in one place are
-    /// dropped. Openings of a wall lie within 2 % of its length or 0.5 m of an end, whichever is more, but no more than
-    /// a quarter of the length.
+    /// dropped. Openings of a wall lie within 2 % of its length or 0.5 m of an end. The larger distance applies, but at
+    /// most a quarter of the length.
     ///
-    /// Errors: coordinates out of range, corners that don't exist, no face, an edge of more than two faces, a hole in a
-    /// body or in a wall between its ends, a wall with a closed end. Allocates: about 190 bytes per face, and twice
-    /// that while building; the tree is the same on any machine.
+    /// Errors: a coordinate is out of range, a corner does not exist, there is no face, an edge has more than two
+    /// faces, a body or a wall between its ends has a hole, or an end of a wall is closed. Allocates: about 190 bytes
+    /// per face, and twice as much during construction. The tree is the same on any machine.
     pub fn new(triangles: Triangles, role: Role) -> Result<Self, MeshError> {
         let mut surface = Surface::new(triangles, role)?;
         let largest = surface.low.iter().chain(&surface.high).fold(0.0_f64, |most, c| most.max(c.abs()));
@@ -90,13 +91,13 @@ impl Mesh {
         Ok(Self { surface, tree })
     }
 
-    /// The nearest point at which a ray meets the mesh, from either side, no farther than `far_m`.
+    /// The nearest hit of a ray on the mesh, from either side, no farther than `far_m`.
     ///
-    /// An origin on the surface itself is hit at range 0. `direction_unit` has length 1. Also `None` if a number other
-    /// than `far_m` isn't finite.
+    /// A ray that starts on the surface hits it at range 0. `direction_unit` must have length 1. The result is `None`
+    /// if there is no hit, or if a number other than `far_m` is not finite.
     pub fn cast(&self, origin: [f64; 3], direction_unit: [f64; 3], far_m: f64) -> Option<MeshHit> {
         let ray = Ray::new(origin, direction_unit, far_m);
-        // Kept beside the tree's own best hit, which among equal ranges is the first one visited.
+        // Kept in addition to the tree's own best hit. Among equal ranges, the tree returns the first hit visited.
         let best: Cell<Option<(f64, u32)>> = Cell::new(None);
         self.tree.find_best(
             f64::MAX,
@@ -116,12 +117,13 @@ impl Mesh {
 
     /// Whether a point is in the solid, or within the wall and between its ends.
     ///
-    /// The triangles from the centroid of each opening to its edges close the ends. A point in two overlapping parts is
-    /// outside. The function counts the ray's crossings of the surface: odd is inside. A ray that touches an edge is
-    /// replaced by another. If all rays touch edges, the point is on the surface and counts as inside.
+    /// The function counts how often a ray from the point crosses the surface. An odd number means inside. Triangles
+    /// from the centroid of each opening to its edges close the ends of a wall. If a ray touches an edge, the next ray
+    /// is tried. If all rays touch edges, the point is on the surface and counts as inside. A point in two overlapping
+    /// parts counts as outside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         let (low, high) = self.bounds();
-        // Written so that NaN is outside.
+        // The negated comparison places NaN outside.
         if !(0..3).all(|k| point[k] >= low[k] && point[k] <= high[k]) {
             return false;
         }
@@ -131,7 +133,7 @@ impl Mesh {
             .unwrap_or(true)
     }
 
-    /// Whether a ray crosses the closed surface an odd number of times; `None` if it touches an edge.
+    /// Whether a ray crosses the closed surface an odd number of times; `None` if the ray touches an edge.
     fn is_crossed_oddly(&self, ray: &Ray) -> Option<bool> {
         let leaves = self.tree.leaves(|node| enters(ray, node) < f64::MAX);
         let met = leaves.map(|leaf| self.surface.triangle(leaf));
@@ -148,14 +150,14 @@ impl Mesh {
         Some(is_odd)
     }
 
-    /// Corners of the bounding box, least and greatest coordinates, metres.
+    /// Corners of the bounding box: least and greatest coordinates, metres.
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         (self.surface.low, self.surface.high)
     }
 
     /// The least and the greatest x between which the mesh is closed all round, metres.
     ///
-    /// A wall's openings lie beyond, or in the planes there.
+    /// The openings of a wall lie at or beyond these two planes.
     pub fn closed_m(&self) -> (f64, f64) {
         let (low, high) = (self.surface.low[0], self.surface.high[0]);
         let middle = f64::midpoint(low, high);

@@ -1,4 +1,4 @@
-//! Reads triangles from PLY files, text or binary.
+//! Reads triangles from PLY files in text or binary encoding.
 
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
@@ -8,33 +8,33 @@ use ply_rs_bw::ply::{
 use super::MeshError;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Names of the list of a face's corners; both are in use.
+/// Names of the property that lists a face's corners. Both are in use.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
-/// Longest error text: errors quote a line of the file, which may be of any length.
+/// Maximum length of an error text. An error quotes a line of the file, which may have any length.
 const MAX_ERROR_CHARS: usize = 300;
 
 /// Triangles as in the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Triangles {
-    /// Corners, in the file's units, taken as metres.
+    /// Coordinates of the corners, in the file's units, which are taken as metres.
     pub vertices: Vec<[f64; 3]>,
-    /// Numbers of each triangle's corners, with either winding.
+    /// Numbers of the corners of each triangle, in either winding.
     pub faces: Vec<[u32; 3]>,
 }
 
-/// Reads the triangles of a PLY file; polygons become fans about their first corner.
+/// Reads the triangles of a PLY file. Polygons become fans about their first corner.
 ///
-/// Other elements and properties than the vertices' x, y, z and the faces' corners are ignored.
+/// All elements and properties are ignored except the x, y and z of vertices and the corners of faces.
 ///
-/// Errors: [`MeshError::File`], with the line if the parser gives it. [`super::Mesh::new`] checks corners and
-/// coordinates. Allocates: in proportion to `bytes`, whatever counts the header claims.
+/// Errors: [`MeshError::File`], with the line number if the parser gives one. [`super::Mesh::new`] checks corners and
+/// coordinates. Allocates: in proportion to `bytes`, independent of the counts in the header.
 pub fn read(bytes: &[u8]) -> Result<Triangles, MeshError> {
     let mut reader = Reader::new(bytes);
     let mut header = Parser::<Ignored>::new().read_header(&mut reader).map_err(|error| unreadable(&error))?;
     check(&header)?;
     widen_text(&mut header);
     let mut triangles = Triangles::default();
-    // Elements without properties take no bytes, whatever count the header claims.
+    // An element without properties takes no bytes, so its count in the header must not set the memory used.
     for element in header.elements.values().filter(|element| !element.properties.is_empty()) {
         match element.name.as_str() {
             "vertex" => {
@@ -90,7 +90,7 @@ fn check(header: &Header) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// Makes the parser read text coordinates as doubles, since they may have more digits than the header's type.
+/// Makes the parser read text coordinates as doubles. They may have more digits than the header's type can hold.
 fn widen_text(header: &mut Header) {
     let Some(vertex) = header.elements.get_mut("vertex").filter(|_| header.encoding == Encoding::Ascii)
     else {

@@ -6,7 +6,7 @@ use headrace_geometry::math;
 
 use super::*;
 
-/// Pseudo-random numbers; the same in every run.
+/// A generator of pseudo-random numbers that are the same in every run.
 struct Random(u64);
 
 impl Random {
@@ -17,7 +17,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// In [-1, 1).
+    /// A number in [-1, 1).
     fn signed(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
@@ -56,7 +56,7 @@ fn toward(from: [f64; 3], to: [f64; 3]) -> ([f64; 3], f64) {
     (d.map(|c| c / length), length)
 }
 
-/// The box from -half to half, its faces in the order -x, +x, -y, +y, -z, +z.
+/// A box from -`half` to `half` on each axis. Its faces are in the order -x, +x, -y, +y, -z, +z.
 pub(super) fn cuboid(half: [f64; 3]) -> Triangles {
     let corner = |i: u32| [0, 1, 2].map(|k| if i >> k & 1 == 1 { half[k] } else { -half[k] });
     let mut faces = Vec::new();
@@ -69,7 +69,7 @@ pub(super) fn cuboid(half: [f64; 3]) -> Triangles {
     Triangles { vertices: (0..8).map(corner).collect(), faces }
 }
 
-/// An icosahedron, each face split in four `levels` times, with the given radius for each vertex.
+/// An icosahedron with each face split in four `levels` times. A function gives the radius of each vertex.
 pub(super) fn icosphere(levels: usize, mut radius_m: impl FnMut() -> f64) -> Triangles {
     let g = f64::midpoint(1.0, math::sqrt(5.0));
     let mut vertices: Vec<[f64; 3]> = Vec::new();
@@ -115,7 +115,7 @@ pub(super) fn icosphere(levels: usize, mut radius_m: impl FnMut() -> f64) -> Tri
     Triangles { vertices, faces }
 }
 
-/// A tube about x with its ends open, with the given radius for each vertex.
+/// A tube about the x-axis with open ends. A function gives the radius of each vertex.
 pub(super) fn tube(rings: u32, around: u32, length_m: f64, mut radius_m: impl FnMut() -> f64) -> Triangles {
     let mut triangles = Triangles::default();
     for i in 0..=rings {
@@ -144,9 +144,9 @@ fn rough_tube() -> Triangles {
     tube(60, 48, 40.0, || 5.0 + random.signed())
 }
 
-/// Range of the nearest hit by the Moller-Trumbore method over all triangles; infinite if there is none.
+/// Range of the nearest hit by the Moller-Trumbore method over all triangles; infinite if there is no hit.
 ///
-/// `None` for rays that pass within a billionth of an edge, where the two methods may differ.
+/// `None` for a ray that passes within a billionth of an edge, where the two methods may differ.
 fn brute(t: &Triangles, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
     let mut nearest = f64::INFINITY;
     for face in &t.faces {
@@ -233,7 +233,7 @@ fn no_ray_slips_between_triangles() {
             let (direction, distance) = toward(origin, target);
             let hit = mesh.cast(origin, direction, f64::INFINITY);
             let range = hit.unwrap_or_else(|| panic!("out by {target:?} from {origin:?}")).range_m;
-            // Seen from off its centre, the rough body may hide the target.
+            // The centre of the rough body may be hidden from a point off its centre.
             assert!(
                 range < distance + 1e-9 && (i % 2 == 1 || range > distance - 1e-9),
                 "{range}, not {distance}"
@@ -243,11 +243,11 @@ fn no_ray_slips_between_triangles() {
 }
 
 #[test]
-fn no_ray_from_a_tubes_axis_slips_through_its_wall() {
+fn no_ray_from_the_axis_of_a_tube_slips_through_its_wall() {
     let triangles = rough_tube();
     let mesh = Mesh::new(triangles.clone(), Role::Wall).unwrap();
     for &target in &triangles.vertices {
-        // Perpendicular to the axis, so that one or two components of the direction are zero or nearly so.
+        // Directions are perpendicular to the axis, so one or two components are zero or nearly zero.
         let origin = [target[0], 0.0, 0.0];
         let (direction, distance) = toward(origin, target);
         let hit = mesh.cast(origin, direction, 100.0).unwrap();
@@ -256,8 +256,8 @@ fn no_ray_from_a_tubes_axis_slips_through_its_wall() {
 }
 
 #[test]
-fn needles_between_triangles_neither_leak_nor_mislead() {
-    // Points on an edge of the box's upper face split off a corner, so that triangles without area join them.
+fn degenerate_triangles_leak_no_rays_and_keep_ranges_right() {
+    // Points on an edge of the box's upper face split off a corner, so the face contains triangles without area.
     let mut t = cuboid([1.0, 1.0, 1.0]);
     let old =
         t.faces.iter().position(|face| face.contains(&4) && face.contains(&5) && face.contains(&7)).unwrap();

@@ -1,4 +1,4 @@
-//! Refused meshes, repaired meshes, error messages, and the speed on large meshes.
+//! Refused meshes, repaired meshes, error messages, and the run time for large meshes.
 
 use super::tests::{cuboid, icosphere, tube};
 use super::*;
@@ -47,7 +47,7 @@ fn duplicated_vertices_are_welded() {
     let whole = icosphere(3, || 2.0);
     let mut t = Triangles::default();
     for (i, corner) in (0_u32..).zip(whole.faces.as_flattened()) {
-        // Off by less than a billionth of the diagonal, to either side.
+        // The copies differ by less than a billionth of the diagonal, to either side.
         let off = f64::from(i % 3) * 1e-9;
         t.vertices.push(whole.vertices[*corner as usize].map(|c| c + off));
     }
@@ -69,14 +69,14 @@ fn edges_of_three_faces_are_refused() {
 }
 
 #[test]
-fn a_body_with_holes_is_refused() {
+fn body_with_holes_is_refused() {
     let mut t = icosphere(3, || 2.0);
     let mut middle = t.faces.len() / 2;
     t.faces.remove(0);
     while t.faces[middle].iter().any(|corner| t.faces[0].contains(corner)) {
         middle += 1;
     }
-    // Removes all faces of one vertex that isn't a corner of the icosahedron.
+    // Removes all faces around one vertex that is not a corner of the icosahedron.
     t.faces.retain(|face| !face.contains(&100));
     let expected =
         "the mesh has 2 hole(s) where it must be closed; the largest has 6 edges, one of them at (";
@@ -95,7 +95,7 @@ fn wall_is_open_only_at_its_ends() {
     let whole = tube(100, 8, 100.0, || 2.0);
     assert!(Mesh::new(whole.clone(), Role::Wall).is_ok());
 
-    // 16 faces between two rings: a missing face within 2 % of the end counts as unevenness of the end.
+    // Each ring has 16 faces. A missing face within 2 % of the end counts as unevenness of the end.
     let mut t = whole.clone();
     t.faces.remove(16);
     assert!(Mesh::new(t, Role::Wall).is_ok());
@@ -106,7 +106,7 @@ fn wall_is_open_only_at_its_ends() {
         "the mesh has 1 hole(s) where it must be closed; the largest has 3 edges, one of them at (50.000, 0.000, 2.000)"
     );
 
-    // A half pipe has one rim, all the way round.
+    // A half pipe has a single rim along all its edges.
     let mut t = whole.clone();
     t.faces.retain(|face| face.iter().all(|corner| corner % 8 <= 4));
     assert!(

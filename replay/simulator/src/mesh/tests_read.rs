@@ -11,7 +11,7 @@ fn sample() -> Triangles {
     icosphere(1, || 2.0)
 }
 
-/// A PLY file with more content than needed.
+/// A PLY file with more elements and properties than needed.
 fn ply(t: &Triangles, encoding: &str) -> Vec<u8> {
     let header = format!(
         "ply\nformat {encoding} 1.0\ncomment by hand\nobj_info no\nelement camera 2\nproperty short id\nproperty list uchar \
@@ -131,7 +131,7 @@ fn text_file_faults_are_described() {
     );
     let words = refused(good.replace("3 0 1 2", "3 0 1 3").as_bytes());
     assert_eq!(words, "face 0 has vertex 3 as a corner, of 3 vertices (both counted from 0)");
-    // An error quotes only the beginning of a long line.
+    // An error quotes only the start of a long line.
     let words = refused(good.replace("1 0 0", &"x".repeat(100_000)).as_bytes());
     assert!(words.len() < 400, "{words}");
 }
@@ -149,14 +149,14 @@ fn binary_file_faults_are_described() {
     wrong[faces + 1] = 0x7F;
     assert!(refused(&wrong).starts_with("face 0 has vertex 2147483647 as a corner, of 42 vertices"));
     let mut wrong = binary;
-    // The x of the first vertex, after the header, two cameras and its colour.
+    // Offset of the x of the first vertex, after the header, two cameras and the vertex's colour.
     let x = faces - 42 * 31 + 1;
     wrong[x..x + 8].copy_from_slice(&f64::NAN.to_be_bytes());
     assert!(refused(&wrong).starts_with("vertex 0 (counted from 0) is at (NaN, "));
 }
 
 #[test]
-fn wrong_counts_take_no_memory() {
+fn wrong_counts_allocate_no_memory() {
     let file = |vertices: u64, list: &str| {
         format!(
             "ply\nformat binary_little_endian 1.0\nelement nothing {vertices}\nelement vertex {vertices}\nproperty float \
@@ -179,7 +179,7 @@ fn wrong_counts_take_no_memory() {
 }
 
 proptest! {
-    /// No bytes cause a panic; they give a mesh or an error.
+    /// Arbitrary bytes give a mesh or an error, and never a panic.
     #[test]
     fn any_bytes_give_a_mesh_or_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
         let starts = ["", "ply\nformat ascii 1.0\n", "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float "];
@@ -189,7 +189,7 @@ proptest! {
         }
     }
 
-    /// The same for files in which a few bytes are changed, lost or doubled.
+    /// Files with a few bytes changed, lost or doubled give a mesh or an error, and never a panic.
     #[test]
     fn damaged_files_give_a_mesh_or_an_error(
         encoding in 0..3_usize,

@@ -1,4 +1,4 @@
-//! The trajectory of a pilot who follows a monitor's advice. It is decided during the dive, a few seconds ahead.
+//! Trajectory of a pilot who follows a monitor's advice. It is decided during the dive, a few seconds ahead.
 
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -12,21 +12,21 @@ use crate::random::Stream;
 
 /// Time between two decisions, s.
 const STEP_S: f64 = 0.5;
-/// Time constant of the vehicle's response to the stick, s.
+/// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// Number of knots beyond its time that a place depends on.
+/// Number of knots after a given time that the position at that time depends on.
 const KNOTS_AHEAD: i64 = 3;
 /// Speed at which the pilot goes back, m/s.
 const BACK_MPS: f64 = 0.2;
-/// Distance that a missed stretch must lie behind before the pilot goes back, and lead-in distance for passing it
-/// again, m.
+/// Distance that a missed stretch must lie behind the vehicle before the pilot goes back, and the run-up before the
+/// second pass, m.
 const BEHIND_M: f64 = 3.0;
 const RUN_UP_M: f64 = 2.5;
-/// Time over which the held share of the advised speed varies, s.
+/// Period over which the ratio of driven to advised speed varies, s.
 const HOLD_S: f64 = 20.0;
-/// Longest total time that the pilot keeps stationary because of advice, s.
+/// Maximum total time that the pilot keeps the vehicle stationary because of advice, s.
 const MOST_STOOD_S: f64 = 120.0;
-/// Time that the pilot waits at the end for further advice, s.
+/// Time that the pilot waits for further advice at the end, s.
 const WAITS_S: f64 = 10.0;
 
 /// A stretch on which the pilot is in a hurry and ignores advice.
@@ -40,28 +40,28 @@ pub(super) struct Hurry {
 /// Parameters of a pilot.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heeding {
-    /// Chainage of start and end, m; the end lies further in.
+    /// Chainage of the start and the end, m. The end has the larger chainage.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
     /// Position in the cross-section about which the vehicle drifts: y, z, m.
     pub(super) across_m: [f64; 2],
-    /// The largest speed driven, m/s.
+    /// Maximum speed, m/s.
     pub(super) speed_mps: f64,
-    /// Delay between advice and action, s, at least 3.
+    /// Delay between advice and action, at least 3 s.
     pub(super) lag_s: f64,
-    /// Largest share by which the held speed falls short of the advised speed.
+    /// Largest relative shortfall of the driven speed below the advised speed.
     pub(super) within: f64,
-    /// Whether missed stretches are passed again.
+    /// Whether the pilot passes missed stretches a second time.
     pub(super) goes_back: bool,
-    /// Whether the pilot keeps stationary when advised to, for the gyros' bias or without a position, and until the
-    /// first advice.
+    /// Whether the pilot keeps the vehicle stationary when advised to, and until the first advice. The advice is given
+    /// for estimating gyro biases, or if there is no position.
     pub(super) stands: bool,
     /// Time that the pilot waits before setting out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
-    /// The longest dive, s.
+    /// Maximum duration of the dive, s.
     pub(super) at_most_s: f64,
-    /// Reach of the drift left, up, m; roll, pitch, yaw, radians; and its period, s.
+    /// Amplitude of the drift: left, up, m; roll, pitch, yaw, radians. And its period, s.
     pub(super) reach: Offsets,
     pub(super) period_s: f64,
 }
@@ -87,12 +87,12 @@ pub(super) struct Advised {
     x_m: f64,
     speed_mps: f64,
     farthest_m: f64,
-    /// Missed stretches that have been passed again.
+    /// Missed stretches that the pilot has gone back for.
     tried_m: Vec<[f64; 2]>,
     /// Number of the next knot to decide.
     next: i64,
     ended_s: Option<f64>,
-    /// Total time that the pilot has been stationary because of advice, s.
+    /// Total time that the pilot has kept the vehicle stationary because of advice, s.
     stood_s: f64,
 }
 
@@ -124,7 +124,7 @@ impl Advised {
         }
     }
 
-    /// Longest possible duration of the dive, s; once the pilot has finished, its actual duration.
+    /// Maximum duration of the dive, s. Once the pilot has finished, the actual duration.
     pub(super) fn duration_s(&self) -> f64 {
         self.ended_s.unwrap_or(self.pilot.at_most_s)
     }
@@ -135,12 +135,12 @@ impl Advised {
         place
     }
 
-    /// Makes a current carry the vehicle.
+    /// Lets a current carry the vehicle.
     pub(super) fn carry(&mut self, flow: &Flow) {
         self.flow = flow.clone();
     }
 
-    /// Processes advice and decides the motion up to `until_s` after the start, s.
+    /// Processes advice and decides the motion until `until_s` seconds after the start.
     pub(super) fn lead(&mut self, told: Vec<PilotAdvice>, until_s: f64) {
         self.heard.extend(told);
         let last = math::floor_to_i64(until_s / STEP_S) + KNOTS_AHEAD;
@@ -189,15 +189,15 @@ impl Advised {
         }
     }
 
-    /// The last advice at least one lag before `at_s`, if any.
+    /// The last advice given at least `lag_s` before `at_s`, if any.
     fn told_at(&self, at_s: f64) -> Option<PilotAdvice> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
         let heard = |told: &&PilotAdvice| told.at <= by && by > MonoNs(START.0);
         self.heard.iter().rev().find(heard).cloned()
     }
 
-    /// The farthest missed stretch that lies behind and hasn't been passed again. While the pilot waits at the end, it
-    /// may lie at any distance behind.
+    /// The missed stretch farthest behind the vehicle that the pilot has not gone back for. It must lie at least
+    /// [`BEHIND_M`] behind, unless the pilot waits at the end.
     fn to_go_back_for(&self, told: &PilotAdvice) -> Option<[f64; 2]> {
         let behind_m = if matches!(self.doing, Doing::Waiting { .. }) { 0.0 } else { BEHIND_M };
         let missed = told.missed_m.iter().filter(|[from_m, to_m]| {
@@ -208,7 +208,7 @@ impl Advised {
         missed.filter(|_| self.pilot.goes_back)
     }
 
-    /// Whether the pilot keeps stationary. He does so until the first advice, but not for ever.
+    /// Whether the pilot keeps the vehicle stationary. The total time is limited to [`MOST_STOOD_S`].
     fn stands(&mut self, told: Option<&PilotAdvice>) -> bool {
         let stands = self.pilot.stands && self.stood_s < MOST_STOOD_S && told.is_none_or(|told| told.stand);
         self.stood_s += if stands { STEP_S } else { 0.0 };
@@ -228,7 +228,7 @@ impl Advised {
             return 0.0;
         }
         let pilot = &self.pilot;
-        // If slowing down doesn't help, or nothing is known, the pilot goes on.
+        // If no speed meets the target, or the speed is unknown, the pilot continues at his own speed.
         let v_max_mps = told.and_then(|told| told.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0);
         v_max_mps.map_or(pilot.speed_mps, |v_max_mps| (v_max_mps * (1.0 + hold)).min(pilot.speed_mps))
     }

@@ -2,12 +2,13 @@
 
 use crate::stretch::Stretch;
 
-/// Speeds of the water by stretches of the tunnel. The water is stationary elsewhere.
+/// Speed of the water for stretches of the tunnel. The water is stationary outside these stretches.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Flow(Vec<(Stretch, f64)>);
 
 impl Flow {
-    /// Adds a stretch with flow `speed_mps`, positive towards growing chainage; false if it overlaps an existing one.
+    /// Adds a stretch with flow `speed_mps`, positive towards growing chainage. Returns false if the stretch overlaps
+    /// an existing one.
     pub(crate) fn add(&mut self, stretch: Stretch, speed_mps: f64) -> bool {
         let is_free = self.0.iter().all(|(other, _)| !other.meets(&stretch));
         if is_free {
@@ -16,12 +17,12 @@ impl Flow {
         is_free
     }
 
-    /// Its speed at a chainage, m/s.
+    /// Speed of the water at a chainage, m/s.
     pub(super) fn at_mps(&self, chainage_m: f64) -> f64 {
         self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)).map_or(0.0, |(_, speed_mps)| *speed_mps)
     }
 
-    /// The next chainage on the way from `from_m` to `to_m` at which the flow may change; `to_m` if there is none.
+    /// The first chainage on the way from `from_m` to `to_m` at which the flow may change; `to_m` if there is none.
     pub(super) fn next_change_m(&self, from_m: f64, to_m: f64) -> f64 {
         let forwards = to_m >= from_m;
         let changes = self.0.iter().flat_map(|(stretch, _)| [stretch.from_m, stretch.to_m]);

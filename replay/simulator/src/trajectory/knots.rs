@@ -1,13 +1,13 @@
-//! Smooth motion through equidistant knots: uniform cubic B-splines, whose acceleration has no jumps.
+//! Smooth motion through equidistant knots: uniform cubic B-splines. Their acceleration has no jumps.
 
 use headrace_geometry::math;
 
 use crate::random::Stream;
 
-/// Along the axis, left, up (m); roll, pitch, yaw (radians).
+/// Offsets along the axis, left and up, m; roll, pitch and yaw, radians.
 pub type Offsets = [f64; 6];
 
-/// Control points of a spline, `spacing_s` apart; the first is one spacing before the start.
+/// Control points of a spline, `spacing_s` apart. The first point lies one spacing before the start.
 ///
 /// The curve stays within the hull of four neighbouring points, so it never exceeds their range.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,13 +17,13 @@ pub struct Knots {
 }
 
 impl Knots {
-    /// A spline for `duration_s`. Its point number k, from -1, is `point(k)` for the time k `spacing_s`.
+    /// A spline of `duration_s`. Control point number k, from -1, is `point(k)` at time k * `spacing_s`.
     pub fn new(duration_s: f64, spacing_s: f64, mut point: impl FnMut(i64) -> Offsets) -> Self {
         let last = math::floor_to_i64(duration_s / spacing_s) + 2;
         Self { spacing_s, points: (-1..=last).map(&mut point).collect() }
     }
 
-    /// Sets a component of point number k, from -1.
+    /// Sets a component of control point number k, from -1.
     pub(super) fn set(&mut self, k: i64, component: usize, value: f64) {
         let point = usize::try_from(k + 1).ok().and_then(|index| self.points.get_mut(index));
         if let Some(slot) = point.and_then(|point| point.get_mut(component)) {
@@ -31,7 +31,8 @@ impl Knots {
         }
     }
 
-    /// Offsets `after_s` seconds after the start; before the first and after the last knot it continues straight.
+    /// Offsets `after_s` seconds after the start. Before the first and after the last knot the motion continues
+    /// straight.
     pub fn at(&self, after_s: f64) -> Offsets {
         let inside = (self.points.len() as f64 - 3.0) * self.spacing_s;
         let within_s = after_s.clamp(0.0, inside.max(0.0));
@@ -84,12 +85,12 @@ impl Knots {
     }
 }
 
-/// A random variation about zero within `reach` either way, of period `period_s`.
+/// A random drift about zero with amplitude `reach` and period `period_s`.
 ///
-/// Control points are half a period apart and drawn evenly. The standard deviation is 0.4 of the reach.
+/// Control points are half a period apart and uniformly distributed. The standard deviation is 0.4 of the amplitude.
 pub fn wandering(stream: Stream, duration_s: f64, period_s: f64, reach: Offsets) -> Knots {
     Knots::new(duration_s, period_s / 2.0, |k| {
-        // Knots begin at -1.
+        // The number of the first knot is -1.
         let step = (k + 1).unsigned_abs();
         let numbers = [0, 1, 2].map(|block| stream.block(step, block).uniform());
         let mut point = reach;

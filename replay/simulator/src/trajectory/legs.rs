@@ -5,7 +5,7 @@ use super::place::Place;
 
 /// Lowest speed of a leg, m/s.
 const SLOWEST_MPS: f64 = 1e-3;
-/// Shortest piece into which a leg is cut where the flow changes, m.
+/// Minimum length of a piece of a leg that is cut at a change of the flow, m.
 const SHORTEST_M: f64 = 1e-6;
 
 /// A leg at constant speed.
@@ -13,7 +13,7 @@ const SHORTEST_M: f64 = 1e-6;
 pub struct Leg {
     /// Distance, m, positive.
     pub distance_m: f64,
-    /// Speed over ground, m/s; negative is backwards.
+    /// Speed over ground, m/s; negative if backwards.
     pub speed_mps: f64,
 }
 
@@ -23,12 +23,12 @@ impl Leg {
     }
 }
 
-/// Legs in sequence, along the axis, level, at one position in the cross-section.
+/// Legs in sequence, level and parallel to the axis, at one position in the cross-section.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Legs {
     across_m: [f64; 2],
     legs: Vec<Leg>,
-    /// Time, s, and chainage, m, at the beginning of each leg.
+    /// Time, s, and chainage, m, at the start of each leg.
     begins: Vec<(f64, f64)>,
     start_m: f64,
 }
@@ -57,7 +57,7 @@ impl Legs {
         Place { chainage_m, across_m: self.across_m, turned_rad: [0.0; 3] }
     }
 
-    /// Applies a flow at the same speeds through water; a leg is cut where the flow changes.
+    /// Applies a flow while the speeds through the water stay the same. A leg is cut where the flow changes.
     ///
     /// Errors, as text: a leg makes no progress against the flow.
     pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
@@ -66,7 +66,7 @@ impl Legs {
             let (mut at_m, mut left_m, towards) = (*begins_m, leg.distance_m, leg.speed_mps.signum());
             while left_m > 0.0 {
                 let change_m = flow.next_change_m(at_m, at_m + towards * left_m);
-                // A leg that isn't cut keeps its length to the last bit.
+                // An uncut leg keeps its exact length.
                 let distance_m = left_m.min((change_m - at_m).abs());
                 let is_last = distance_m >= left_m - SHORTEST_M;
                 let distance_m = if is_last { left_m } else { distance_m };

@@ -1,4 +1,4 @@
-//! The vehicle's trajectory through the tunnel: its position relative to the axis at any time.
+//! Trajectory of the vehicle through the tunnel: its position relative to the axis at any time.
 
 mod advised;
 mod flow;
@@ -39,34 +39,34 @@ enum Base {
 }
 
 impl Trajectory {
-    /// Legs at constant speed from `start_m`, level, at one position in the cross-section.
+    /// Creates a trajectory of legs at constant speed from `start_m`, level, at one position in the cross-section.
     pub fn of_legs(start_m: f64, across_m: [f64; 2], legs: Vec<Leg>) -> Self {
         let legs = Legs::new(start_m, across_m, legs);
         Self { duration_s: legs.duration_s(), base: Base::Legs(legs), sways: Vec::new() }
     }
 
-    /// A smooth trajectory along knots for `duration_s`.
+    /// Creates a smooth trajectory along knots for `duration_s`.
     pub fn of_knots(knots: Knots, duration_s: f64) -> Self {
         Self { base: Base::Knots(knots), sways: Vec::new(), duration_s }
     }
 
-    /// A pilot's trajectory.
+    /// Creates a pilot's trajectory.
     fn piloted(piloted: Piloted) -> Self {
         Self { duration_s: piloted.duration_s(), base: Base::Piloted(Box::new(piloted)), sways: Vec::new() }
     }
 
-    /// The trajectory of a pilot who follows advice.
+    /// Creates the trajectory of a pilot who follows advice.
     fn advised(advised: Advised) -> Self {
         Self { duration_s: advised.duration_s(), base: Base::Advised(Box::new(advised)), sways: Vec::new() }
     }
 
-    /// Whether it depends on advice to the pilot.
+    /// Whether the trajectory depends on advice to the pilot.
     pub fn is_advised(&self) -> bool {
         matches!(self.base, Base::Advised(_))
     }
 
-    /// Passes advice to the pilot and decides the motion up to `until_s` seconds after the start. Other trajectories
-    /// don't change.
+    /// Passes advice to the pilot and decides the motion until `until_s` seconds after the start. Other kinds of
+    /// trajectory stay as they are.
     pub(crate) fn lead(&mut self, told: Vec<PilotAdvice>, until_s: f64) {
         if let Base::Advised(advised) = &mut self.base {
             advised.lead(told, until_s);
@@ -74,7 +74,7 @@ impl Trajectory {
         }
     }
 
-    /// Duration, s. For an advised pilot it is the longest possible one until he has finished.
+    /// Duration, s. For an advised pilot, the maximum duration until he has finished.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
@@ -93,14 +93,15 @@ impl Trajectory {
         place
     }
 
-    /// Superposes a further motion over the current duration.
+    /// Adds a further motion over the current duration.
     pub fn sway(&mut self, knots: Knots) {
         self.sways.push(knots);
     }
 
-    /// Makes the flow carry a vehicle that moves through the water. It reaches the same end after another duration.
+    /// Lets the flow carry a vehicle that moves through the water. The vehicle reaches the same end after another
+    /// duration.
     ///
-    /// Errors, as text: a leg that makes no progress against the current; a trajectory given over ground.
+    /// Errors, as text: a leg makes no progress against the current, or the trajectory is given over ground.
     pub fn carry(&mut self, flow: &Flow) -> Result<(), String> {
         match &mut self.base {
             Base::Legs(legs) => {

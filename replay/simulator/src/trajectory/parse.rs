@@ -1,4 +1,4 @@
-//! The `[trajectory]` table.
+//! Reads the `[trajectory]` table.
 
 use std::ops::RangeInclusive;
 
@@ -13,7 +13,7 @@ use super::waypoints::{self, Waypoint};
 use super::{Ground, Leg, Trajectory, recorded};
 use crate::random::Stream;
 
-/// A dive may begin and end up to 20 m outside the tunnel.
+/// Largest distance outside the tunnel at which a dive may start or end, m.
 const OUTSIDE_M: f64 = 20.0;
 const CHAINAGE_M: RangeInclusive<f64> = -OUTSIDE_M..=1.0e6;
 const ACROSS_M: RangeInclusive<f64> = -200.0..=200.0;
@@ -21,7 +21,7 @@ const SPEED_MPS: RangeInclusive<f64> = 0.001..=5.0;
 const DEGREES: RangeInclusive<f64> = -80.0..=80.0;
 const REACH_M: RangeInclusive<f64> = 0.0..=100.0;
 const REACH_DEG: RangeInclusive<f64> = 0.0..=80.0;
-/// Name of the trajectories' random streams.
+/// Name of the random streams of trajectories.
 const NAME: &str = "trajectory";
 
 #[derive(Debug, Clone, Copy)]
@@ -41,9 +41,9 @@ const KINDS: [(&str, TrajectoryKind); 5] = [
     ("recorded", TrajectoryKind::Recorded),
 ];
 
-/// Reads a trajectory in a tunnel of this design; also returns the reference of its speeds.
+/// Reads a trajectory in a tunnel of this design. Also returns the reference of its speeds.
 ///
-/// Errors: a key that is missing, unknown or out of range; a trajectory that goes beyond the tunnel's ends.
+/// Errors: a key is missing, unknown or out of range, or the trajectory goes beyond the ends of the tunnel.
 pub(crate) fn parse(
     section: &Section<'_>,
     (design, length_m): (&Profile, f64),
@@ -112,7 +112,7 @@ fn legs(section: &Section<'_>, tunnel: Tunnel<'_>) -> Result<Trajectory, ConfigE
         let Some(parsed) = parsed else { continue };
         legs.push(parsed);
         chainage_m += parsed.distance_m * parsed.speed_mps.signum();
-        // The leg's end is known if all previous legs are valid.
+        // The end of the leg is known only if all previous legs are valid.
         if legs.len() == number + 1 {
             tunnel.check(leg, "distance_m", chainage_m)?;
         }
@@ -141,7 +141,7 @@ fn waypoints(section: &Section<'_>, tunnel: Tunnel<'_>) -> Result<Trajectory, Co
     }
     let (knots, duration_s) = waypoints::knots(&points);
     if points.is_empty() || duration_s <= 0.0 {
-        let problem = "don't move; give at least two different places, or one with stay_s";
+        let problem = "do not move; give at least two different positions, or one with stay_s";
         return Err(section.invalid("waypoints", problem));
     }
     Ok(Trajectory::of_knots(knots, duration_s))
@@ -180,9 +180,9 @@ fn pilot(section: &Section<'_>, tunnel: Tunnel<'_>, seed: u64) -> Result<Traject
     Ok(Trajectory::piloted(piloted))
 }
 
-/// Reads the reach of a pilot's drift: left and up, m; roll, pitch and yaw, radians.
+/// Reads the amplitude of a pilot's drift: left and up, m; roll, pitch and yaw, radians.
 ///
-/// `usual` has the defaults of left, up, and yaw in degrees.
+/// `usual` has the default amplitudes to the left and up, m, and of yaw, degrees.
 fn wander(section: &Section<'_>, [left, up, yaw]: [f64; 3]) -> Result<Offsets, ConfigError> {
     let or = |key, allowed, usual: f64| section.number(key, allowed).map(|value| value.unwrap_or(usual));
     let degrees = |key, usual| or(key, REACH_DEG, usual).map(f64::to_radians);

@@ -1,4 +1,4 @@
-//! A pilot's trajectory: moving, stopping, going back for a second look, and drifting throughout.
+//! A pilot's trajectory: moving, stopping, going back to look again, and drifting throughout.
 
 use headrace_geometry::math;
 
@@ -9,33 +9,33 @@ use crate::random::Stream;
 
 /// Time between two decisions, s.
 const STEP_S: f64 = 0.5;
-/// Time constant of the vehicle's response to the stick, s.
+/// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// Ratio to its duration without stops above which a dive counts as endless.
+/// Ratio of a dive's duration to its duration without stops, above which the dive counts as endless.
 const MOST_TIMES_AS_LONG: f64 = 50.0;
 
 /// Parameters of a pilot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pilot {
-    /// Chainage of start and end, m.
+    /// Chainage of the start and the end, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
     /// Position in the cross-section about which the vehicle drifts: y, z, m.
     pub(super) across_m: [f64; 2],
     /// Speed while moving, m/s.
     pub(super) speed_mps: f64,
-    /// Stops per hour, and reversals per hour.
+    /// Number of stops per hour and of reversals per hour.
     pub(super) stops_per_hour: f64,
     pub(super) backs_per_hour: f64,
-    /// The shortest and longest stop, s, and distance back, m.
+    /// Shortest and longest duration of a stop, s, and of the distance back, m.
     pub(super) stop_s: [f64; 2],
     pub(super) back_m: [f64; 2],
-    /// Reach of the drift left, up, m; roll, pitch, yaw, radians; and its period, s.
+    /// Amplitude of the drift: left, up, m; roll, pitch, yaw, radians. And its period, s.
     pub(super) reach: Offsets,
     pub(super) period_s: f64,
 }
 
-/// A pilot and his trajectory, which changes with a current.
+/// A pilot with his trajectory, which depends on the current.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piloted {
     pilot: Pilot,
@@ -54,9 +54,9 @@ enum Doing {
 }
 
 impl Pilot {
-    /// The chainage at each step, and once before the first.
+    /// The chainage at each step, and one step before the first.
     ///
-    /// Errors, as text: a trajectory that never ends.
+    /// Errors, as text: the trajectory never ends.
     fn chainages_m(&self, stick: Stream, flow: &Flow) -> Result<Vec<f64>, String> {
         let towards = (self.to_m - self.from_m).signum();
         let plain_s = (self.to_m - self.from_m).abs() / self.speed_mps;
@@ -112,7 +112,7 @@ impl Pilot {
 impl Piloted {
     /// A pilot's trajectory in still water.
     ///
-    /// Errors, as text: a trajectory that never ends.
+    /// Errors, as text: the trajectory never ends.
     pub(super) fn new(pilot: Pilot, stick: Stream, wander: Stream) -> Result<Self, String> {
         let nowhere = Knots::new(0.0, STEP_S, |_| [0.0; 6]);
         let (along, beside) = (nowhere.clone(), nowhere);

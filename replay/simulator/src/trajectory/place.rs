@@ -13,12 +13,12 @@ pub struct Place {
     pub turned_rad: [f64; 3],
 }
 
-/// Reference of a trajectory's speeds.
+/// Reference of the speeds of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ground {
-    /// The vehicle holds its speed through the water: a current carries it.
+    /// The speeds are relative to the water. A current carries the vehicle.
     Water,
-    /// The trajectory is given over ground: a current doesn't change it.
+    /// The trajectory is given over ground. A current does not change it.
     Tunnel,
 }
 

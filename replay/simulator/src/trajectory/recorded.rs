@@ -1,24 +1,24 @@
-//! A recorded trajectory: one line per timestamp.
+//! A recorded trajectory: a file with one line per timestamp.
 
 use headrace_geometry::math;
 
 use super::knots::{Knots, Offsets};
 use super::waypoints::through;
 
-/// Interval of the knots, s; the recording is smoothed over four of them.
+/// Interval of the knots, s. The recording is smoothed over four intervals.
 const SPACING_S: f64 = 0.1;
-/// Longest recorded trajectory, s: two days.
+/// Maximum duration of a recorded trajectory, s: two days.
 const MAX_S: f64 = 172_800.0;
 
 /// A pose with its time, s.
 type Timed = (f64, Offsets);
 
-/// Reads lines `t_s,chainage_m,y_m,z_m[,roll_deg,pitch_deg,yaw_deg]`; returns the poses, with times from the first.
+/// Reads lines `t_s,chainage_m,y_m,z_m[,roll_deg,pitch_deg,yaw_deg]`; returns the poses. Times count from the first
+/// pose.
 ///
-/// Lines that begin with # are skipped, and so is the first other line if it is text. Times must increase. Angles are
-/// unwrapped.
+/// Lines that begin with # and a header line are skipped. Times must increase. Angles are unwrapped.
 ///
-/// Errors, as text, with the line.
+/// Errors, as text with the line number: a line is invalid.
 pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
     let mut begun = false;
     let mut timed: Vec<Timed> = Vec::new();
@@ -37,7 +37,10 @@ pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
             return Err(format!("line {} of it is {start:?}; expected {wanted}", number + 1));
         };
         if timed.last().is_some_and(|(before_s, _)| at_s <= *before_s) {
-            return Err(format!("line {} of it has the time {at_s} s, not after the one before", number + 1));
+            return Err(format!(
+                "line {} has the time {at_s} s, which is not after the previous time",
+                number + 1
+            ));
         }
         if let Some((_, before)) = timed.last() {
             turn_short(before, &mut place);
@@ -45,7 +48,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
         timed.push((at_s, place));
     }
     let (Some((first_s, _)), Some((last_s, _))) = (timed.first().copied(), timed.last().copied()) else {
-        return Err("has no line with a place".to_owned());
+        return Err("has no line with a position".to_owned());
     };
     let duration_s = last_s - first_s;
     if !(duration_s > 0.0 && duration_s <= MAX_S) {
@@ -63,7 +66,8 @@ pub(super) fn knots(timed: &[Timed]) -> (Knots, f64) {
     (through(timed, SPACING_S, duration_s), duration_s)
 }
 
-/// Unwraps angles to within half a turn of the previous ones, so that 179 and -179 degrees are near each other.
+/// Unwraps each angle to within half a turn of the previous angle. The angles 179 and -179 degrees are thus close to
+/// each other.
 fn turn_short([.., roll, pitch, yaw]: &Offsets, [.., new_roll, new_pitch, new_yaw]: &mut Offsets) {
     for (before, angle) in [(roll, new_roll), (pitch, new_pitch), (yaw, new_yaw)] {
         *angle = before + math::wrap_signed(*angle - before, math::TAU);

@@ -6,7 +6,7 @@ use super::*;
 use crate::random::Stream;
 use crate::stretch::Stretch;
 
-/// A trajectory in a tunnel of 200 m.
+/// A trajectory in a tunnel with a length of 200 m.
 fn parsed(trajectory: &str, seed: u64) -> Result<(Trajectory, Ground), String> {
     recorded(trajectory, seed, "")
 }
@@ -46,7 +46,8 @@ fn legs_follow_each_other_without_a_jump() {
     assert!(steps.windows(2).all(|w| (w[1].chainage_m - w[0].chainage_m).abs() < 0.005 + 1e-9));
 }
 
-/// Corners are rounded over two seconds, so the trajectory begins and ends a sixth of half a second's travel inside.
+/// Corners are rounded over two seconds. The trajectory therefore starts after, and ends before, its outer waypoints,
+/// by a sixth of the distance travelled in half a second.
 #[test]
 fn waypoints_are_passed_at_their_speeds() {
     let trajectory = trajectory(
@@ -101,7 +102,7 @@ fn pilot_reaches_the_end_within_bounds_both_ways() {
     }
 }
 
-/// The distance back is as drawn, to the nearest step.
+/// The distance back is as given, to the nearest step.
 #[test]
 fn pilot_goes_back_the_given_distance() {
     let keys = "kind = \"pilot\"\nto_m = 190\nspeed_mps = 1\nstops_per_hour = 0\nbacks_per_hour = 30\n\
@@ -114,7 +115,7 @@ fn pilot_goes_back_the_given_distance() {
         backs += gone.windows(2).filter(|w| w[0] >= 0.0 && w[1] < 0.0).count() as f64;
         lost_m += trajectory.duration_s() - 190.0;
     }
-    // Three seconds back, and three to make up for them; starting takes 1.5.
+    // Each reversal costs three seconds to go back and three seconds to make up for the distance. Starting costs 1.5 s.
     let each_s = (lost_m - 50.0 * 1.5) / backs;
     assert!((each_s - 6.0).abs() < 0.3, "{each_s} of {backs}");
 }
@@ -134,7 +135,7 @@ fn recorded_trajectory_is_followed_as_recorded() {
     assert_eq!((trajectory.duration_s(), ground), (30.0, Ground::Tunnel));
     let middle = trajectory.place(5.0);
     assert!((middle.chainage_m - 6.0).abs() < 1e-9 && (middle.across_m[0] - 0.5).abs() < 1e-9);
-    // From 170 to -170 degrees by 180, not by 0.
+    // From 170 to -170 degrees, the angle passes through 180 degrees and not through 0.
     assert!((middle.turned_rad[2].to_degrees() - 180.0).abs() < 1e-9);
     let later = trajectory.place(20.0);
     assert!(
@@ -143,13 +144,13 @@ fn recorded_trajectory_is_followed_as_recorded() {
 }
 
 #[test]
-fn errors_of_a_recorded_trajectory_are_named() {
+fn errors_in_a_recorded_trajectory_are_reported() {
     let why = |file: &str| recorded("kind = \"recorded\"\nfile = \"track.csv\"\n", 1, file).unwrap_err();
     for (file, problem) in [
-        ("", "has no line with a place"),
-        ("t,x\n", "has no line with a place"),
-        ("0,1,2,3\n0,1,2,3\n", "line 2 of it has the time 0 s, not after the one before"),
-        ("t,x,y,z\nt,x,y,z\n", "line 2 of it is \"t,x,y,z\""),
+        ("", "has no line with a position"),
+        ("t,x\n", "has no line with a position"),
+        ("0,1,2,3\n0,1,2,3\n", "line 2 has the time 0 s, which is not after the previous time"),
+        ("t,x,y,z\nt,x,y,z\n", "line 2 is \"t,x,y,z\""),
         ("0,1,2,3\n1,2,nan,3\n", "line 2"),
         ("0,1,2,3\n1,2,3\n", "expected t_s,chainage_m,y_m,z_m"),
         ("5,1,0,4\n", "takes 0 s"),
@@ -184,7 +185,7 @@ fn random_knots(seed: u64) -> (Knots, Vec<Offsets>) {
 }
 
 #[test]
-fn a_spline_stays_within_the_hull_of_its_points() {
+fn spline_stays_within_the_hull_of_its_points() {
     for seed in 0..20 {
         let (knots, points) = random_knots(seed);
         for step in 0..3000_u32 {
@@ -200,9 +201,9 @@ fn a_spline_stays_within_the_hull_of_its_points() {
     }
 }
 
-/// Position, speed and acceleration have no jump at a knot; beyond the ends the curve continues straight.
+/// Position, speed and acceleration have no jump at a knot. Beyond the ends, the curve continues straight.
 #[test]
-fn a_spline_is_smooth_to_its_acceleration() {
+fn spline_acceleration_has_no_jumps() {
     let (knots, _) = random_knots(3);
     let step_s = 1e-4;
     let at = |after_s: f64| knots.at(after_s)[0];
@@ -214,7 +215,7 @@ fn a_spline_is_smooth_to_its_acceleration() {
         let (before_s, behind_s) = (knot_s - 2.0 * step_s, knot_s + 2.0 * step_s);
         assert!((at(behind_s) - at(before_s)).abs() < 0.01);
         assert!((speed(behind_s) - speed(before_s)).abs() < 0.02);
-        // The third derivative is bounded by 8 points / 0.7^3.
+        // The third derivative is at most 8 times the largest coordinate, divided by 0.7^3.
         assert!((acceleration(behind_s) - acceleration(before_s)).abs() < 0.05, "{knot_s}");
     }
     for (end_s, sign) in [(0.0, -1.0), (43.0 * 0.7, 1.0)] {
@@ -225,7 +226,7 @@ fn a_spline_is_smooth_to_its_acceleration() {
 }
 
 #[test]
-fn wandering_has_its_reach_and_spread() {
+fn random_drift_has_the_given_amplitude_and_spread() {
     let reach = [1.0, 2.0, 0.0, 0.1, 0.2, 0.3];
     let knots = wandering(Stream::new(2, "wandering", "test"), 20_000.0, 10.0, reach);
     let (mut squares, mut products, count) = ([0.0; 6], 0.0, 20_000_u32);
@@ -238,7 +239,8 @@ fn wandering_has_its_reach_and_spread() {
         products += offsets[0] * offsets[1] / f64::from(count);
     }
     for (variance, reach) in squares.into_iter().zip(reach) {
-        // Over about 2,000 independent stretches; the variance is 151/315 of that of even numbers.
+        // The tolerance fits about 2,000 independent intervals. The variance is 151/315 of that of uniform random
+        // numbers.
         let wanted = reach * reach / 3.0 * 151.0 / 315.0;
         assert!((variance - wanted).abs() <= 0.1 * wanted, "{variance} {wanted}");
     }
@@ -251,8 +253,8 @@ fn everywhere(speed_mps: f64) -> Flow {
     flow
 }
 
-/// If the flow changes within a leg, each piece takes its length divided by its own speed, and the places between
-/// follow from those times.
+/// If the flow changes within a leg, the time for each piece is its length divided by its own speed. The positions
+/// within a piece follow from these times.
 #[test]
 fn current_carries_only_within_its_stretch() {
     let mut flow = Flow::default();
@@ -285,7 +287,7 @@ fn current_carries_only_within_its_stretch() {
             legs.place(after_s).chainage_m
         );
     }
-    // Only the leg for which the flow is too strong is refused, and only with flow on it.
+    // A leg is refused only if the flow is too strong on the leg itself.
     let mut strong = Flow::default();
     assert!(strong.add(Stretch { from_m: 100.0, to_m: 200.0 }, -1.0));
     legs.carry(&strong).unwrap();
@@ -310,7 +312,7 @@ fn current_carries_only_motion_through_water() {
 }
 
 #[test]
-fn sway_adds_to_any_trajectory() {
+fn drift_adds_to_the_motion_of_legs() {
     let mut legs = trajectory("place_m = [0.5, 4]\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.2\n");
     legs.sway(Knots::new(60.0, 1.0, |_| [1.0, 0.25, -0.5, 0.1, 0.2, 0.3]));
     let place = legs.place(30.0);

@@ -1,4 +1,4 @@
-//! Navigation by the cable's counter alone: the simplest possible method, with which all others are compared.
+//! Navigation by the cable's counter alone: the simplest possible method, with which all other methods are compared.
 
 use headrace_fusion::relative::Relative;
 use headrace_fusion::{Fix, Navigation, NoFix, Times};
@@ -10,12 +10,12 @@ use headrace_geometry::tunnel::{Profile, Yz};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Time over which the speed is taken, s.
+/// Averaging time of the speed, s.
 const SPEED_OVER_S: f64 = 1.0;
 /// Age above which a reading is ignored, s.
 const STALE_S: f64 = 2.0;
 
-/// The chainage of a reading, m; `None` if it isn't from a cable.
+/// The chainage of a cable reading, m; `None` for any other reading.
 pub(super) fn chainage_m(info: &SensorInfo, reading: &Reading) -> Option<f64> {
     match (info.kind, reading) {
         (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
@@ -25,13 +25,13 @@ pub(super) fn chainage_m(info: &SensorInfo, reading: &Reading) -> Option<f64> {
     }
 }
 
-/// Navigation with chainage and speed from the counter.
+/// Navigation that takes chainage and speed from the counter.
 ///
-/// The vehicle is assumed in the middle of the section, level and straight ahead. Errors are taken to be those of the
-/// counter's resolution.
+/// The vehicle is assumed to be in the middle of the section, level and heading straight ahead. The stated errors are
+/// those of the counter's resolution.
 pub(super) struct CableNavigation {
     middle: Yz,
-    /// The last reading, and one about [`SPEED_OVER_S`] before it: time, and chainage, m.
+    /// The last reading, and a reading about [`SPEED_OVER_S`] earlier, each as time and chainage, m.
     last: Option<(MonoNs, f64)>,
     before: Option<(MonoNs, f64)>,
     speed_mps: f64,
@@ -41,7 +41,7 @@ pub(super) struct CableNavigation {
 stateful!(CableNavigation { state: last, before, speed_mps, resolution_m; fixed: middle; });
 
 impl CableNavigation {
-    /// Creates the navigation, without readings.
+    /// Creates the navigation without readings.
     pub(super) fn new(profile: &Profile) -> Self {
         Self { middle: profile.reference(), last: None, before: None, speed_mps: 0.0, resolution_m: 0.0 }
     }

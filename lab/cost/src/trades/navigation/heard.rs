@@ -1,4 +1,4 @@
-//! The input of navigation in a dive, recorded so that navigation can be run and timed without the rest of the loop.
+//! Records the input of navigation in a dive, so that navigation can be run and timed without the rest of the loop.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::smooth::backward::Backward;
@@ -17,7 +17,7 @@ use super::cable::CableNavigation;
 use crate::error::CostError;
 use headrace_oracle::dive::{JudgedDive, Recorded};
 
-/// Capacity of the journal, from which steps are taken right after their epoch; it holds the steps after a silence.
+/// Capacity of the journal. Steps are read right after their epoch, so the capacity covers the steps after a silence.
 const JOURNAL: usize = 4096;
 
 /// A reading as passed to navigation.
@@ -37,7 +37,7 @@ pub(super) struct Hearing {
 }
 
 impl Hearing {
-    /// Replays a dive with navigation by the cable alone, and records the input.
+    /// Replays a dive with navigation by the cable alone, and records its readings.
     ///
     /// Errors: the loop can't be armed or driven.
     pub(super) fn of(recorded: &Recorded, vehicle: &VehicleConfig) -> Result<(Self, JudgedDive), CostError> {
@@ -68,7 +68,7 @@ impl Hearing {
         ))
     }
 
-    /// Cable readings as chainages: time of validity, and chainage, m.
+    /// Chainage of each cable reading, m, with its time of validity.
     pub(super) fn chainages(&self) -> impl Iterator<Item = (MonoNs, f64)> {
         self.readings.iter().filter_map(|heard| {
             let info = self.sensors.get(heard.source)?;
@@ -76,7 +76,7 @@ impl Hearing {
         })
     }
 
-    /// The first `part_s` of the dive, s, long enough to time.
+    /// The readings of the first `part_s` seconds of the dive.
     pub(super) fn first(&self, part_s: f64) -> Self {
         let begun = self.readings.first().map_or(MonoNs(0), |heard| heard.times.received);
         let within = |heard: &&Heard| heard.times.received.since(begun).as_secs_f64() <= part_s;
@@ -84,7 +84,7 @@ impl Hearing {
         Self { sensors: self.sensors.clone(), readings, duration_s: self.duration_s.min(part_s) }
     }
 
-    /// Runs a navigation as the loop does: before each ping it requests a fix and passes it to `take`.
+    /// Runs a navigation as the loop does: requests a fix before each ping and passes the fix to `take`.
     pub(super) fn run(
         &self,
         navigation: &mut dyn Navigation,
@@ -93,7 +93,7 @@ impl Hearing {
         self.run_noting(navigation, take, &mut || {});
     }
 
-    /// Runs a navigation like [`Hearing::run`]; `after` is called after each reading.
+    /// Runs a navigation as [`Hearing::run`] does, and calls `after` after each reading.
     fn run_noting(
         &self,
         navigation: &mut dyn Navigation,
@@ -112,7 +112,7 @@ impl Hearing {
         after();
     }
 
-    /// Navigation along the track that a smoother makes of a filter's run.
+    /// Runs the filter, smooths its result, and returns a navigation along the smoothed track.
     pub(super) fn smoothed(&self, vehicle: &VehicleConfig, settings: &Settings) -> TrackNavigation {
         let (journal, steps) = Journal::new(JOURNAL);
         let mut filter = smoothable(vehicle.tunnel.profile.clone(), vehicle.site, *settings, journal);

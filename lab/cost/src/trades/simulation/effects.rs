@@ -2,7 +2,7 @@
 
 use crate::error::CostError;
 
-/// Every effect that can be combined with the others, with some parameters.
+/// Every effect that can be combined with the others, with typical parameters.
 ///
 /// Heads turn all round, so `sector_end_slowing` doesn't apply.
 pub(super) const ALL: &str = "[effects]
@@ -37,7 +37,7 @@ line_delay = { jitter_ms = 2 }
 byte_errors = { flipped_per_million = 20 }
 ";
 
-/// The effect of a scene's line: a line in `[effects]`, or the header of an effect's own table.
+/// Name of the effect that a line of a scene states: a line in `[effects]`, or the header of an effect's own table.
 fn effect_of(line: &str, in_effects: bool) -> Option<&str> {
     if line.starts_with('[') {
         return line.trim_matches(['[', ']']).strip_prefix("effects.");
@@ -69,9 +69,9 @@ pub(super) fn named(text: &str) -> Vec<String> {
     names
 }
 
-/// A scene without an effect.
+/// Removes an effect from a scene's text.
 ///
-/// Errors: the scene doesn't name it.
+/// Errors: the scene does not name the effect.
 pub(super) fn without(text: &str, effect: &str) -> Result<String, CostError> {
     let kept = lines(text).filter(|(_, of)| *of != Some(effect)).map(|(line, _)| format!("{line}\n"));
     let kept: String = kept.collect();
@@ -82,9 +82,9 @@ pub(super) fn without(text: &str, effect: &str) -> Result<String, CostError> {
     Ok(kept)
 }
 
-/// A scene with this number of rays per beam.
+/// Sets the number of rays per beam in a scene's text.
 ///
-/// Errors: it doesn't name `beam_cone` in a line of its own.
+/// Errors: the scene does not name `beam_cone` in a line of its own.
 pub(super) fn with_rays(text: &str, rays: u32) -> Result<String, CostError> {
     let plain = text.replace("beam_cone = {}", &format!("beam_cone = {{ rays = {rays} }}"));
     let changed = plain.replace("beam_cone = { sensors", &format!("beam_cone = {{ rays = {rays}, sensors"));

@@ -24,7 +24,7 @@ fn sphere_is_matched_to_a_twentieth_of_a_cell() {
     let spread = Spread::of(mesh.vertices.iter().map(|p| norm(*p) - 3.0));
     assert!(spread.count > 500 && spread.max_m < surface.cell_m() / 20.0, "{spread:?}");
     assert!(surface.value([0.0; 3]) > 0.2 && surface.value([3.4, 0.0, 0.0]) < -0.2);
-    // The mean curvature's sign: triangles face the water.
+    // The distance from the centre to the flat triangles is smaller than the sphere's radius.
     assert!(MeshIndex::new(&mesh, 0.2).unwrap().distance_m([0.0; 3]) < 3.0);
 }
 
@@ -36,7 +36,7 @@ fn sparse_samples_give_a_single_sphere() {
 }
 
 #[test]
-fn the_solver_ends_at_its_tolerance() {
+fn solver_reports_a_residual_above_its_tolerance() {
     let within = |steps_max| Surface::through(&sphere(2000, 1.0), &Settings { steps_max, ..settings(5) });
     assert!(within(299).is_ok());
     let refused = within(3).err();
@@ -47,14 +47,14 @@ fn the_solver_ends_at_its_tolerance() {
 }
 
 #[test]
-fn the_same_samples_give_the_same_bits() {
+fn same_samples_give_the_same_bits() {
     let samples = sphere(700, 2.0);
     let meshes = [0, 1].map(|_| Surface::through(&samples, &settings(5)).unwrap().mesh());
     assert_eq!(meshes[0], meshes[1]);
 }
 
 #[test]
-fn size_and_place_do_not_change_the_surface() {
+fn scale_and_position_do_not_change_the_surface() {
     let moved: Vec<Sample> = sphere(2000, 2.0)
         .into_iter()
         .map(|s| Sample { place: s.place.map(|c| c * 512.0 + 1e5), normal: s.normal })

@@ -35,13 +35,13 @@ fn example_1() -> Command {
 }
 
 #[test]
-fn worked_example_1_both_ways() {
+fn worked_example_1_encodes_and_decodes() {
     assert_eq!(example_1().encode(), Ok(EXAMPLE_1));
     assert_eq!(Command::decode(&EXAMPLE_1), Ok(example_1()));
 }
 
 #[test]
-fn worked_example_2_both_ways() {
+fn worked_example_2_encodes_and_decodes() {
     let command = Command {
         range_m: 3,
         start_gain_db: 10.0,
@@ -60,7 +60,7 @@ fn worked_example_2_both_ways() {
 
 #[test]
 fn step_is_rounded_not_truncated() {
-    // In single precision 0.9 / 0.3 falls below 3.
+    // In single precision, 0.9 / 0.3 is slightly less than 3.
     let step_deg = f64::from(0.9_f32) - 1e-6;
     assert_eq!(Command { step_deg, ..example_1() }.encode().unwrap()[13], 3);
     let error = Command { step_deg: 1.5, ..example_1() }.encode().unwrap_err();

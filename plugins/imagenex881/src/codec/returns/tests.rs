@@ -12,7 +12,7 @@ fn header(bytes: &[u8]) -> (Header, usize) {
 }
 
 #[test]
-fn worked_example_3_a_real_881a_header() {
+fn worked_example_3_decodes_a_real_881a_header() {
     let (header, echo_len) =
         header(&[0x49, 0x4D, 0x58, 0x10, 0x41, 0x01, 0x01, 0x05, 0x00, 0x00, 0x7C, 0x01]);
     assert_eq!((header.tag, header.position, header.clockwise), (Tag::Imx, 129, false));
@@ -21,7 +21,7 @@ fn worked_example_3_a_real_881a_header() {
 }
 
 #[test]
-fn worked_examples_4_to_6_both_ways() {
+fn worked_examples_4_to_6_encode_and_decode() {
     let expected = [
         (EXAMPLE_4, 750, true, 10, Some(5370)),
         (EXAMPLE_5, 300, false, 3, Some(2468)),
@@ -38,7 +38,7 @@ fn worked_examples_4_to_6_both_ways() {
 }
 
 #[test]
-fn worked_example_7_a_real_852_header() {
+fn worked_example_7_decodes_a_real_852_header() {
     let (header, echo_len) =
         header(&[0x49, 0x47, 0x58, 0x11, 0x45, 0x78, 0x0A, 0x32, 0x40, 0x03, 0x74, 0x03]);
     assert_eq!((header.tag, header.status, header.range_m), (Tag::Igx, Status(0x45), 50));
@@ -107,9 +107,9 @@ fn echo_that_resembles_a_return_stays_an_echo() {
 
 /// Returns that can't form a false return together with the next one.
 ///
-/// They have 0xFC only at the end, echo lengths that differ by less than a header, and no positions that read as such
-/// a length in its place. Otherwise the front of one return and the whole of the next could form a false one that no
-/// decoder can detect. `echo_of_any_bytes_round_trips` covers the other values.
+/// The front of one return and the whole of the next could form a false return that no decoder can detect. These
+/// returns exclude that: 0xFC occurs only at the end, echo lengths differ by less than a header, and no position equals
+/// such a length when read in the length's place. `echo_of_any_bytes_round_trips` covers the other values.
 fn returns(tags: &[Tag], lengths: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Return> + use<> {
     let tags = proptest::sample::select(tags.to_vec());
     let echo = (proptest::collection::vec(0u8..0xFC, MAX_ECHO_BYTES), lengths);

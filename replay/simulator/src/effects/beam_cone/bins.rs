@@ -1,29 +1,29 @@
-//! Strength of a ping's echo over bins of range.
+//! Strength of a ping's echo over range bins.
 
 use headrace_geometry::math;
 
-/// Strengths over bins of equal width, centred on multiples of the width.
+/// Strengths in bins of equal width, which are centred on multiples of the width.
 ///
-/// This interprets "we use bilinear interpolation of range values of the 881L sensor to determine where the tunnel
-/// surface is". The head's picture is a grid of angle and range. An echo between grid points is shared linearly among
-/// its neighbours, in angle (beam strength, which falls off linearly from the axis) and in range. The surface is the
-/// ridge of the picture. If the beam is oblique to the wall, its echo is long and the ridge is wide and low, as the
-/// paper found next to the corners. Source: Jorge et al. 2021, §9.2.
+/// The bins implement this sentence of the paper: "we use bilinear interpolation of range values of the 881L sensor to
+/// determine where the tunnel surface is". The head's picture is a grid of angle and range. An echo between grid points
+/// is shared linearly among the neighbouring points. In angle, the share is the beam strength, which falls linearly
+/// from the axis. The surface is the ridge of the picture. If the beam is oblique to the wall, its echo is long and the
+/// ridge is wide and low, as the paper found next to corners. Source: Jorge et al. 2021, §9.2.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bins {
     width_m: f64,
     strengths: Vec<f64>,
-    /// First bin with an echo, and one past the last.
+    /// Index of the first bin with an echo, and one past the last bin with an echo.
     filled: (usize, usize),
 }
 
 impl Bins {
-    /// Empty bins, `width_m` > 0 wide.
+    /// Creates empty bins of width `width_m`, which must be above 0.
     pub(super) fn new(width_m: f64) -> Self {
         Self { width_m, strengths: Vec::new(), filled: (usize::MAX, 0) }
     }
 
-    /// Adds an echo, shared linearly between the two bins nearest to `range_m`.
+    /// Adds an echo. It is shared linearly between the two bins nearest to `range_m`.
     pub(super) fn add(&mut self, range_m: f64, strength: f64) {
         let at = range_m / self.width_m;
         let Ok(below) = usize::try_from(math::floor_to_i64(at)) else { return };
@@ -37,10 +37,10 @@ impl Bins {
         self.filled = (self.filled.0.min(below), self.filled.1.max(below + 2));
     }
 
-    /// Range of the strongest echo, m; empties the bins.
+    /// Returns the range of the strongest echo, m, and empties the bins.
     ///
-    /// It is the centroid of the strongest bin and its two neighbours; of equal bins the nearest counts. `None` if the
-    /// bins are empty.
+    /// The range is the centroid of the strongest bin and its two neighbours. Among equally strong bins, the nearest
+    /// counts. Returns `None` if the bins are empty.
     pub(super) fn take_surface_m(&mut self) -> Option<f64> {
         let (from, to) = std::mem::replace(&mut self.filled, (usize::MAX, 0));
         let filled = self.strengths.get_mut(from..to)?;

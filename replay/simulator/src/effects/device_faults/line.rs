@@ -1,4 +1,4 @@
-//! Messages of broken devices.
+//! Messages of devices with a fault.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_geometry::math;
@@ -8,13 +8,13 @@ use super::span::Span;
 use crate::random::Stream;
 use crate::sensing::Line;
 
-/// Sends nothing, or random bytes.
+/// Makes a device's line silent, or replaces its bytes with random bytes.
 #[derive(Component)]
 pub(super) struct BrokenLine {
     span: Span,
-    /// Source of the random bytes.
+    /// Source of the random bytes; `None` for a silent line.
     stream: Option<Stream>,
-    /// Number of random bytes so far.
+    /// Number of random bytes sent so far.
     said: u64,
 }
 
@@ -33,7 +33,7 @@ impl BrokenLine {
         for message in received.filter(|message| self.span.holds(message.at)) {
             let (from, to) = message.bytes;
             let Some(stream) = self.stream else {
-                // The outbox drops messages without bytes; the others keep their indices.
+                // Messages without bytes keep their indices, and the outbox drops them.
                 message.bytes = (from, from);
                 continue;
             };

@@ -2,7 +2,7 @@
 
 use headrace_geometry::time::MonoNs;
 
-/// From a start time to an end time, which is excluded.
+/// A span of time. Its end is excluded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
     pub(super) from: MonoNs,

@@ -15,7 +15,7 @@ fn breaks(at: MonoNs) -> bool {
     (START + DurNs::from_secs_f64(FROM_S)..START + DurNs::from_secs_f64(FROM_S + FOR_S)).contains(&at)
 }
 
-/// All measurements of a sensor, without the fault and with it.
+/// All measurements of a sensor, each without the fault and with the fault.
 fn both<M: headrace_sensor::measurement::Measurement>(sensor: &str, fault: &str) -> Vec<(M, M)> {
     let moving = "[effects.motion_within_turn]\n[effects.pilot_drift]\nup_m = 0.5\nyaw_deg = 60\n";
     let run = |effects: &str| Bench::on(LEGS, &format!("{moving}{effects}")).run::<M>(sensor);
@@ -58,7 +58,7 @@ fn jump_shifts_values_by_its_size() {
     }
     let mut seen = 0;
     for (plain, broken) in both::<Sounding>("ping", "kind = \"jump\"\nsize = 0.7") {
-        // The head looks along the tunnel and sees a wall only when the vehicle is turned.
+        // The echosounder looks along the tunnel, and sees a wall only when the vehicle is turned.
         if let (Some(plain_m), Some(broken_m)) = (plain.range_m, broken.range_m) {
             off(plain.at, [plain_m, broken_m], 0.7);
             seen += usize::from(breaks(plain.at));
@@ -78,7 +78,7 @@ fn jump_shifts_values_by_its_size() {
     }
 }
 
-/// Messages of one line without and with the fault; messages of other sensors are in both.
+/// Messages of all lines, without the fault and with the fault.
 fn lines(sensor: &str, fault: &str) -> [Vec<OnLine>; 2] {
     [String::new(), keys(sensor, fault)].map(|effects| {
         let messages = Bench::turning(&effects).messages().into_iter();

@@ -1,4 +1,4 @@
-//! Measurements of broken devices.
+//! Measurements of devices with a fault.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_geometry::frames::Rot;
@@ -7,7 +7,7 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout,
 use super::span::Span;
 use crate::sensing::{Echosounder, Samples, Scenery};
 
-/// Repeats the last value.
+/// Makes a sensor repeat its last value.
 #[derive(Component)]
 pub(super) struct Stuck<M: Measurement> {
     span: Span,
@@ -20,9 +20,9 @@ impl<M: Measurement> Stuck<M> {
     }
 }
 
-/// A measurement whose value can be replaced by another's.
+/// A measurement whose value can be replaced by that of another measurement.
 pub(super) trait Sticking: Measurement {
-    /// The measurement with the value of `other`, but its own time and head angles.
+    /// Returns this measurement with the value of `other`. Time and head angles stay.
     #[must_use]
     fn valued(self, other: &Self) -> Self;
 }
@@ -57,7 +57,7 @@ impl Sticking for Payout {
     }
 }
 
-/// Holds the last value before the span. A device that is stuck from the beginning holds its first value.
+/// Repeats the last value before the span. A device that is stuck from the dive's start repeats its first value.
 pub(super) fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &mut Stuck<M>)>) {
     for (mut samples, mut stuck) in &mut devices {
         for measured in &mut samples.list {
@@ -71,7 +71,7 @@ pub(super) fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &m
     }
 }
 
-/// Adds a constant error to values.
+/// Adds a constant error to a sensor's values.
 #[derive(Component)]
 pub(super) struct Jumped {
     pub(super) size: f64,

@@ -2,10 +2,11 @@
 
 use headrace_geometry::math;
 
-/// Reference range at which the mean echo of rough rock, perpendicular to the beam, is just detected, m.
+/// Range at which the mean echo of rough rock, perpendicular to the beam, is just detected, m.
 ///
-/// It holds for the frequency, absorption and pulse below. It is the head's largest range setting when profiling, with
-/// the settings that DUNE uses there. No source states the head's source level, noise or threshold.
+/// The range applies to the frequency, absorption and pulse below. It is the head's largest range setting for
+/// profiling. Frequency, absorption and pulse are those that DUNE uses at that setting. No source states the head's
+/// source level, noise or threshold.
 ///
 /// Source: the 881L's data sheet and switch command (range settings to 100 m; 675 kHz and 0.2 dB/m above 5 m; 540 us at
 /// 100 m).
@@ -13,20 +14,20 @@ const HEARD_M: f64 = 100.0;
 const HEARD_AT_KHZ: f64 = 675.0;
 const HEARD_DBPM: f64 = 0.2;
 const HEARD_PULSE_S: f64 = 540e-6;
-/// Excess of such a wall's echo at 1 m over the threshold at a gain of 20 dB, dB.
+/// Excess of the echo of rough rock at 1 m over the threshold, at a gain of 20 dB, dB.
 ///
-/// This is an assumption, since the maker states no threshold. With the usual gains, a wall is then above the threshold
-/// as long as the absorption setting matches the water's.
+/// This is an assumption, since the maker states no threshold. With the usual gains, a wall's echo is then above the
+/// threshold if the absorption setting matches the water's absorption.
 const ABOVE_THRESHOLD_DB: f64 = 20.0;
 const USUAL_GAIN_DB: f64 = 20.0;
-/// Density of silt over that of water: quartz.
+/// Ratio of the density of silt (quartz) to that of water.
 const GRAIN_DENSITY: f64 = 2.65;
 /// Kinematic viscosity of water at 10 degrees, m^2/s.
 const VISCOSITY_M2PS: f64 = 1.307e-6;
-/// Decibels of a neper.
+/// Decibels per neper.
 const DB_PER_NEPER: f64 = 8.685_889_638_065_037;
 
-/// A head's sound in this water.
+/// Sound of a head in this water.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sonar {
     /// Full width of the beam, radians.
@@ -35,27 +36,28 @@ pub(crate) struct Sonar {
     pub(crate) pulse_s: f64,
     /// Speed of sound, m/s.
     pub(crate) sound_mps: f64,
-    /// Absorption by the water, one way, dB/m.
+    /// Absorption by water and silt, one way, dB/m.
     pub(crate) absorbed_dbpm: f64,
     /// Backscatter of the wall relative to rough rock, dB.
     pub(crate) wall_db: f64,
-    /// Gain at 1 m, dB; gain for ten times the range, dB; and absorption for which the gain compensates, one way, dB/m.
+    /// Gain at 1 m, dB. `log_gain_db` is the gain per factor of ten in range, dB. `made_up_dbpm` is the one-way
+    /// absorption that the gain compensates, dB/m.
     pub(crate) gain_db: f64,
     pub(crate) log_gain_db: f64,
     pub(crate) made_up_dbpm: f64,
 }
 
-/// Grains in the water.
+/// Silt in the water.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Silt {
-    /// Their mass, grams per litre.
+    /// Mass of the grains, grams per litre.
     pub(crate) gpl: f64,
-    /// Their radius, m.
+    /// Radius of the grains, m.
     pub(crate) grain_m: f64,
 }
 
 impl Sonar {
-    /// Probability that an echo from a wall at `range_m` is detected; `square` is the cosine of incidence.
+    /// Probability that the echo of a wall at `range_m` is detected. `square` is the cosine of incidence.
     pub(crate) fn detected(&self, range_m: f64, square: f64) -> f64 {
         let echo_db = self.echo_db(range_m.max(0.01), square);
         let noise_db = 10.0 * log10(HEARD_PULSE_S / self.pulse_s);
@@ -69,7 +71,7 @@ impl Sonar {
         math::exp(-1.0 / mean)
     }
 
-    /// Mean power of an echo, dB, relative to a square metre of rough rock facing the beam at 1 m.
+    /// Mean power of an echo, dB relative to a square metre of rough rock that faces the beam at 1 m.
     fn echo_db(&self, range_m: f64, square: f64) -> f64 {
         // Lambert's law: both the incident and the returned sound are proportional to the cosine.
         let scattered_db = self.wall_db + 20.0 * log10(square.max(1e-6));
@@ -79,8 +81,8 @@ impl Sonar {
             + scattered_db
     }
 
-    /// Area of wall whose echo arrives at one time: the whole beam footprint, or a strip if the footprint is longer
-    /// than the pulse.
+    /// Area of wall whose echo arrives at one time, m^2. This is the whole footprint of the beam, or a strip if the
+    /// footprint is longer than the pulse.
     fn insonified_m2(&self, range_m: f64, square: f64) -> f64 {
         let wide_m = self.beam_rad * range_m;
         let within_beam_m2 = core::f64::consts::FRAC_PI_4 * wide_m * wide_m / square.max(1e-6);
@@ -90,7 +92,7 @@ impl Sonar {
     }
 }
 
-/// The power at which an echo at [`HEARD_M`] is just detected, dB as in [`Sonar::echo_db`].
+/// Power of an echo that is just detected at [`HEARD_M`], dB as in [`Sonar::echo_db`].
 fn heard_db() -> f64 {
     let wide_m = f64::to_radians(2.4 - (HEARD_AT_KHZ - 600.0) / 400.0) * HEARD_M;
     10.0 * log10(core::f64::consts::FRAC_PI_4 * wide_m * wide_m)
@@ -98,16 +100,16 @@ fn heard_db() -> f64 {
         - 2.0 * HEARD_DBPM * HEARD_M
 }
 
-/// Frequency of a beam of this full width, kHz: 2.4 degrees at 600 kHz, 1.4 at 1 MHz.
+/// Frequency of a head whose beam has this full width, kHz. The width is 2.4 degrees at 600 kHz and 1.4 at 1 MHz.
 ///
 /// Source: the 881L's data sheet, beam widths.
 pub(crate) fn frequency_of_khz(beam_rad: f64) -> f64 {
     (600.0 + (2.4 - beam_rad.to_degrees()) * 400.0).clamp(600.0, 1000.0)
 }
 
-/// Absorption for which the head is set to compensate, dB/m: at 1 MHz, and at 675 kHz.
+/// Usual setting of the absorption that the head compensates, dB/m: one value for 1 MHz, one for 675 kHz.
 ///
-/// Source: the switch command as DUNE's driver sets it; the edge is halfway.
+/// Source: the switch command as DUNE's driver sets it. The limit between the two values is halfway.
 pub(super) fn usual_absorption_dbpm(frequency_khz: f64) -> f64 {
     if frequency_khz > 837.0 { 0.6 } else { 0.2 }
 }
@@ -131,7 +133,7 @@ pub(crate) fn pulse_of_us(range_m: f64) -> f64 {
 
 /// Absorption of sound by fresh water, one way, dB/m.
 ///
-/// Source: Francois and Garrison 1982, J. Acoust. Soc. Am. 72, 1879: the term of pure water.
+/// Source: Francois and Garrison 1982, J. Acoust. Soc. Am. 72, 1879, the term for pure water.
 pub(crate) fn water_absorption_dbpm(frequency_khz: f64, t_degc: f64) -> f64 {
     let db_per_km_khz2 = if t_degc <= 20.0 {
         4.937e-4 + t_degc * (-2.59e-5 + t_degc * (9.11e-7 + t_degc * -1.50e-8))
@@ -142,7 +144,8 @@ pub(crate) fn water_absorption_dbpm(frequency_khz: f64, t_degc: f64) -> f64 {
 }
 
 impl Silt {
-    /// Absorption of sound by the grains, one way, dB/m: friction of the water around them, and scattering.
+    /// Absorption of sound by the grains, one way, dB/m. The causes are scattering, and friction of the water around
+    /// the grains.
     ///
     /// Source: Urick 1948, J. Acoust. Soc. Am. 20, 283.
     pub(crate) fn absorption_dbpm(&self, frequency_khz: f64, sound_mps: f64) -> f64 {
@@ -155,7 +158,7 @@ impl Silt {
         let denser = GRAIN_DENSITY - 1.0;
         let friction = k * denser * denser * s / (s * s + (GRAIN_DENSITY + tau) * (GRAIN_DENSITY + tau));
         let scattering = k * k * k * k * self.grain_m * self.grain_m * self.grain_m / 3.0;
-        // Both terms concern power; a neper concerns amplitude.
+        // Both terms are absorption of power, while nepers refer to amplitude.
         volume * (friction + scattering) / 2.0 * DB_PER_NEPER
     }
 }

@@ -11,8 +11,8 @@ fn square(x: f64) -> f64 {
     x * x
 }
 
-/// Pinkerton 1949, Proc. Phys. Soc. B 62, 129: absorption of pure water divided by the frequency squared, 1e-15 s^2/m
-/// in nepers.
+/// Measured absorption of pure water divided by the frequency squared, 1e-15 s^2/m in nepers. Source: Pinkerton 1949,
+/// Proc. Phys. Soc. B 62, 129.
 #[test]
 fn water_absorption_matches_measurements() {
     for (t_degc, measured) in [(0.0, 56.9), (10.0, 36.1), (20.0, 25.3), (30.0, 19.1)] {
@@ -23,17 +23,18 @@ fn water_absorption_matches_measurements() {
     assert!((water_absorption_dbpm(1000.0, 10.0) / water_absorption_dbpm(500.0, 10.0) - 4.0).abs() < 1e-12);
 }
 
-/// Compares with the motion of a grain in oscillating water, integrated step by step.
+/// Compares the absorption with the motion of a grain in oscillating water, integrated step by step.
 ///
-/// The drag is that on an oscillating sphere (Landau and Lifshitz, "Fluid mechanics", §24, problem 5). Its work is
-/// taken from the sound.
+/// The drag is that on an oscillating sphere (Landau and Lifshitz, "Fluid mechanics", §24, problem 5). The sound loses
+/// the work done by the drag.
 #[test]
 fn silt_absorption_matches_friction_at_its_grains() {
     let (sound_mps, viscosity) = (1447.0, 1.307e-6);
     for (frequency_khz, grain_m) in [(675.0, 2e-6), (1000.0, 5e-6), (1000.0, 20e-6)] {
         let omega = math::TAU * frequency_khz * 1000.0;
         let depth_m = math::sqrt(2.0 * viscosity / omega);
-        // Per unit of displaced mass: drag = resistance * (u - v) + added * d(u - v)/dt, and Archimedes' du/dt.
+        // Forces per unit of displaced mass: the drag, resistance * (u - v) + added * d(u - v)/dt, and the buoyancy in
+        // accelerated water, du/dt.
         let resistance = 9.0 * viscosity / (2.0 * grain_m * grain_m) * (1.0 + grain_m / depth_m);
         let added = 0.5 * (1.0 + 9.0 * depth_m / (2.0 * grain_m));
         let (steps, turns) = (4000, 60);
@@ -55,7 +56,7 @@ fn silt_absorption_matches_friction_at_its_grains() {
             v = next;
         }
         let power = work / (5.0 * math::TAU / omega);
-        // For sound of velocity 1, the power per area is c / 2, per unit of the water's density.
+        // For a sound velocity amplitude of 1, the power per area is c / 2, per unit of the water's density.
         let volume = 1.0 / 2650.0;
         let neper_pm = volume * power / (sound_mps / 2.0) / 2.0;
         let scattering_neper_pm =
@@ -66,7 +67,8 @@ fn silt_absorption_matches_friction_at_its_grains() {
     }
 }
 
-/// Compares the detected share, by range, incidence and silt, with the sonar equation in powers instead of decibels.
+/// Compares the share of detected echoes, by range, incidence and silt, with the sonar equation computed in powers
+/// instead of decibels.
 #[test]
 fn detected_share_matches_the_sonar_equation() {
     let mut dive = Dive { seconds: 1500.0, speed_mps: 0.01, ..Dive::with_head() };
@@ -108,7 +110,7 @@ fn detected_share_matches_the_sonar_equation() {
     }
 }
 
-/// The vehicle's own parts are detected even if no wall is.
+/// The vehicle's own parts are detected even if no wall is detected.
 #[test]
 fn parts_of_the_vehicle_are_always_detected() {
     let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";

@@ -1,4 +1,4 @@
-//! A head's pings as heard by others.
+//! A head's pings, as other heads hear them.
 
 use headrace_geometry::frames::{Point3, Tunnel, Vec3};
 use headrace_geometry::math;
@@ -20,7 +20,7 @@ pub(super) struct Ping {
     pub(super) origin: Point3<Tunnel>,
     pub(super) direction: Vec3<Tunnel>,
     pub(super) wall: Option<Point3<Tunnel>>,
-    /// Whether it is extrapolated and its `wall` not yet computed.
+    /// Whether the ping is extrapolated and its `wall` is not yet computed.
     foreseen: bool,
 }
 
@@ -29,13 +29,13 @@ pub(super) struct Ping {
 pub(super) struct Pings(Vec<Ping>);
 
 impl Ping {
-    /// A ping along a ray. A ping stopped by the vehicle itself reaches no wall.
+    /// Creates a ping along a ray. A ping that the vehicle itself stops reaches no wall.
     pub(super) fn new(at: MonoNs, ray: &Ray, stopped: bool) -> Self {
         let wall = ray.hit.filter(|_| !stopped).map(|hit| hit.point);
         Self { at, origin: ray.origin, direction: ray.direction, wall, foreseen: false }
     }
 
-    /// Computes the wall point of an extrapolated ping.
+    /// Computes the wall point if the ping is extrapolated.
     pub(super) fn seen(self, environment: &Environment, far_m: f64) -> Self {
         if !self.foreseen {
             return self;
@@ -44,7 +44,7 @@ impl Ping {
         Self { wall, foreseen: false, ..self }
     }
 
-    /// Extrapolates to the `count`-th ping after this one, with the same interval and rotation as from `before` to this one.
+    /// Extrapolates to the `count`-th ping after this one. Interval and rotation are those from `before` to this ping.
     fn foreseen(&self, before: &Self, count: u32) -> Self {
         let period = self.at.since(before.at);
         let step_rad = between_rad(before.direction, self.direction);
@@ -63,21 +63,21 @@ impl Ping {
 }
 
 impl Pings {
-    /// Drops pings more than `rings_s` before `from`, but keeps the last two for extrapolation.
+    /// Drops pings earlier than `rings_s` before `from`. The last two pings are kept for extrapolation.
     pub(super) fn forget(&mut self, from: MonoNs, rings_s: f64) {
         let old = |ping: &Ping| from.since(ping.at).as_secs_f64() > rings_s;
         let gone = self.0.partition_point(old).min(self.0.len().saturating_sub(2));
         self.0.drain(..gone);
     }
 
-    /// Adds the next one.
+    /// Adds the next ping.
     pub(super) fn add(&mut self, ping: Ping) {
         self.0.push(ping);
     }
 
     /// Pings from `earliest_s` to `latest_s` after `at`.
     ///
-    /// Pings up to `at` are those simulated; later ones are extrapolated, so that the result doesn't depend on how far
+    /// Pings up to `at` are simulated ones. Later pings are extrapolated, so that the result doesn't depend on how far
     /// the simulation has run.
     pub(super) fn around(
         &self,
@@ -91,7 +91,7 @@ impl Pings {
         let last = if let [.., before, last] = made { Some((before, last)) } else { None };
         let later = (1..=MOST_FORESEEN).map_while(move |count| {
             let (before, last) = last.filter(|(before, last)| before.at < last.at)?;
-            // Quick exit: the next ping nearly always comes too late to matter.
+            // Usually the next ping comes too late to matter, so its time is checked first.
             let period_s = last.at.since(before.at).as_secs_f64();
             let on_s = after_s(last) + period_s * f64::from(count);
             (on_s <= latest_s).then(|| last.foreseen(before, count))
@@ -125,7 +125,7 @@ mod tests {
             assert_eq!(foreseen.at, made.at);
             assert!((foreseen.direction + -made.direction).norm() < 1e-12);
         }
-        // The same result without the pings after `at`.
+        // The result is the same without the pings after `at`.
         let short = Pings(pings.0[..51].to_vec());
         assert!(short.around(at, -0.05, 0.05).eq(pings.around(at, -0.05, 0.05)));
     }

@@ -8,7 +8,7 @@ use crate::testing::Dive;
 
 const SOUND_MPS: f64 = 1500.0;
 
-/// Two heads, one at each side of a box-shaped vehicle; the true speed of sound is that of the vehicle file.
+/// Two heads, one at each side of a box-shaped vehicle. The true speed of sound is that of the vehicle file.
 fn pair() -> Dive {
     let mut dive = Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]]);
     dive.vehicle = "[water]\nsound_speed_mps = 1500\n[heads]\nlayout = \"phase_shift\"";
@@ -69,7 +69,8 @@ fn reflected_and_direct_paths_give_their_apparent_ranges() {
         ear.hear(1, &sounds);
         ear.heard.then_some(ear.within_m[1])
     };
-    // Both heads look at the middle of the floor, 0.4 m from either. The paths are equal, and an earlier ping is heard.
+    // Both heads look at the middle of the floor, with equal paths. Pings at the same time interfere with neither head.
+    // An earlier ping of the other head is heard.
     let inwards = math::atan2(0.4, 2.5);
     let way_m = 2.0 * math::hypot(0.4, 2.5);
     assert_eq!(heard(-inwards, inwards, 0.0), None);
@@ -77,11 +78,11 @@ fn reflected_and_direct_paths_give_their_apparent_ranges() {
         let expected_m = (way_m - earlier_ms / 1000.0 * SOUND_MPS) / 2.0;
         assert!((heard(-inwards, inwards, -earlier_ms).unwrap() - expected_m).abs() < 1e-6);
     }
-    // An even earlier ping arrives before the own ping, or within the least range.
+    // An even earlier ping arrives before this head's own ping, or within the least range.
     assert_eq!(heard(-inwards, inwards, -3.4), None);
     // Another point of the wall isn't within the beam.
     assert_eq!(heard(-inwards, inwards + 0.1, -1.0), None);
-    // Face to face: 0.8 m apart, heard 0.4 m away if both ping at once.
+    // The heads face each other, 0.8 m apart. If both ping at once, each hears the other at an apparent range of 0.4 m.
     let (right, left) = (1.5 * math::PI, math::FRAC_PI_2);
     assert!((heard(right, left, 0.0).unwrap() - 0.4).abs() < 1e-9);
     assert!((heard(right, left, -0.2).unwrap() - 0.25).abs() < 1e-6);
@@ -89,7 +90,7 @@ fn reflected_and_direct_paths_give_their_apparent_ranges() {
     assert_eq!(heard(right - 0.3, left, 0.0), None);
 }
 
-/// Two heads half a turn apart face each other twice per turn, and each hears the other at half their distance.
+/// Two heads half a turn apart face each other twice per turn. Each then hears the other at half their distance.
 #[test]
 fn synchronous_heads_hear_each_other_when_facing() {
     let dive = pair();
@@ -105,7 +106,7 @@ fn synchronous_heads_hear_each_other_when_facing() {
         let faces =
             off(angle_rad, 1.5 * math::PI) <= half_rad && off(others[number], math::FRAC_PI_2) <= half_rad;
         if faces {
-            // The heads' pictures may differ by the motion between two pings.
+            // The heads' places may differ by the vehicle's motion between two pings.
             assert!((range_m.unwrap() - 0.4).abs() < 1e-4, "{range_m:?}");
             heard += 1;
         } else {
@@ -132,7 +133,7 @@ fn unsynchronised_heads_hear_each_other_by_the_wall_and_through_side_lobes() {
 }
 
 #[test]
-fn slice_length_does_not_change_results_of_lasting_pings() {
+fn slice_length_does_not_change_interference() {
     let mut dive = out_of_step();
     dive.seconds = 12.0;
     dive.assert_slices_dont_matter("[effects.interference]\nshare = 0.5");

@@ -1,9 +1,9 @@
-//! Effects combined, and their cost.
+//! Combinations of effects on sonars.
 
 use crate::testing::{Dive, Dived};
 use crate::truth::TruthRow;
 
-/// Each effect of the sonars with some keys.
+/// Each effect on sonars, with some keys.
 const EFFECTS: [&str; 11] = [
     "[effects.beam_cone]\n",
     "[effects.occlusion]\n",
@@ -22,7 +22,7 @@ fn pair() -> Dive {
     Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]])
 }
 
-/// Changes of each measurement by an effect, given by its index among those of a scene.
+/// Changes of each measurement by an effect. `effect` is the effect's index among those of the scene.
 fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
     let of = |row: &TruthRow| {
         let cause = row.causes.iter().find(|cause| cause.effect == effect)?;
@@ -43,7 +43,7 @@ fn naming_an_effect_does_not_change_draws_of_others() {
     for effects in [EFFECTS[0], EFFECTS[2], EFFECTS[3], EFFECTS[4]] {
         assert!(alone == outliers(effects, 1), "{effects}");
     }
-    // Named in the other order, the effects still run in the fixed order.
+    // Even if the scene names them in another order, the effects run in the fixed order.
     let (a, b) = (EFFECTS[8], EFFECTS[7]);
     assert_eq!(dive.dive(&format!("{a}{b}")).messages, dive.dive(&format!("{b}{a}")).messages);
 }
@@ -55,7 +55,7 @@ fn adding_a_head_does_not_change_draws_of_the_first() {
         let ranges_m = dive.dive(&effects).ranges_m(0);
         ranges_m.into_iter().map(|range_m| range_m.map(f64::to_bits)).collect::<Vec<_>>()
     };
-    // Without a speed for the phases, the first head's program is the same.
+    // Without a planned speed, the number of heads doesn't change the first head's program.
     let one = Dive::with_heads(&[[0.0, 0.4, 0.0]]);
     assert_eq!(bits(&one), bits(&pair()));
 }

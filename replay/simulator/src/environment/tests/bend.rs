@@ -1,4 +1,4 @@
-//! The axis: points, headings and the inverse.
+//! The tunnel's axis: points, headings and the conversion from points to chainage.
 
 use super::*;
 
@@ -11,7 +11,7 @@ fn axis() -> Axis {
 }
 
 #[test]
-fn place_and_chart_are_each_others_inverse() {
+fn place_and_chart_conversions_are_inverse() {
     let axis = axis();
     let mut lcg = Lcg(20);
     for _ in 0..20_000 {
@@ -22,7 +22,7 @@ fn place_and_chart_are_each_others_inverse() {
 }
 
 #[test]
-fn the_axis_is_smooth_and_its_heading_is_its_direction() {
+fn axis_is_smooth_and_heading_matches_its_direction() {
     let axis = axis();
     let step = 1e-4;
     for k in -200_000..2_000_000 {

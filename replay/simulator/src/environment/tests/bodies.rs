@@ -1,4 +1,4 @@
-//! Features, compared with an independent model and closed forms; and the index, compared with a full search.
+//! Features compared with an independent model and closed forms, and the index compared with a full search.
 
 use super::oracle::{Oracle, Shape, ellipsoid, upright};
 use super::*;
@@ -15,7 +15,7 @@ fn boulder_is_an_ellipsoid_sunk_into_the_floor() {
     let environment = parse(&text, &CERAN.profile());
     let hit = cast(&environment, [10.0, 0.0, 5.0], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (5.0 - 0.6)).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // At the height of its centre, 0.2 m above the floor, seen along the tunnel and from the side.
+    // Rays at the height of the centre, 0.2 m above the floor, along the tunnel and from the side.
     let hit = cast(&environment, [5.0, 0.0, 0.2], [1.0, 0.0, 0.0]).unwrap();
     assert!((hit.range_m - 4.0).abs() < 1e-12 && (hit.normal.x() + 1.0).abs() < 1e-12, "{hit:?}");
     let hit = cast(&environment, [10.0, 4.0, 0.2], [0.0, -1.0, 0.0]).unwrap();
@@ -28,7 +28,7 @@ fn boulder_is_an_ellipsoid_sunk_into_the_floor() {
 }
 
 #[test]
-fn a_boulder_on_a_round_wall_leans_with_it() {
+fn boulder_on_a_round_wall_is_aligned_with_the_wall() {
     let quarter = 3.0 * math::FRAC_PI_2;
     let text = feature("boulder", &format!("chainage_m = 10\nsize_m = 1\nsunk = 0\narc_m = {quarter}"));
     let environment = parse(&text, &shapes::circle(3.0).unwrap());
@@ -37,7 +37,7 @@ fn a_boulder_on_a_round_wall_leans_with_it() {
 }
 
 #[test]
-fn a_rock_trap_is_a_ditch_across_the_floor() {
+fn rock_trap_is_a_ditch_across_the_floor() {
     let text = feature("rock_trap", "chainage_m = 10\nlength_m = 4\ndepth_m = 1.5");
     let environment = parse(&text, &CERAN.profile());
     let mut oracle = Oracle::new(CERAN);
@@ -51,12 +51,12 @@ fn a_rock_trap_is_a_ditch_across_the_floor() {
 }
 
 #[test]
-fn side_tunnel_has_its_given_length() {
+fn side_tunnel_has_the_given_length() {
     let keys = "chainage_m = 10\nside = \"left\"\nwidth_m = 3\nheight_m = 2\nsill_m = 1\nlength_m = 30";
     let environment = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
     let hit = cast(&environment, [10.0, -1.0, 2.0], [0.0, 1.0, 0.0]).unwrap();
     assert!((hit.range_m - 35.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // From inside it back to the opposite wall, and to its own side wall.
+    // Ranges from inside the side tunnel to the opposite wall and to its own side wall.
     let back = cast(&environment, [10.5, 30.0, 2.0], [0.0, -1.0, 0.0]).unwrap();
     assert!((back.range_m - 34.0).abs() < 1e-12 && back.what == What::Wall, "{back:?}");
     let side = cast(&environment, [10.5, 30.0, 2.0], [1.0, 0.0, 0.0]).unwrap();
@@ -68,10 +68,10 @@ fn side_tunnel_has_its_given_length() {
 }
 
 #[test]
-fn a_slanting_side_tunnel_leads_forwards() {
+fn slanting_side_tunnel_leads_forwards() {
     let keys = "chainage_m = 10\nside = \"right\"\nwidth_m = 3\nheight_m = 2\nlength_m = 10\nangle_deg = 30";
     let environment = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
-    // Its centre line meets the wall at chainage 10.
+    // The centre line of the side tunnel meets the wall at chainage 10.
     let (sin, cos) = math::sin_cos(math::PI / 6.0);
     let hit = cast(&environment, [10.0 - sin, -4.0 + cos, 1.0], [sin, -cos, 0.0]).unwrap();
     assert!((hit.range_m - 11.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
@@ -86,7 +86,7 @@ fn a_slanting_side_tunnel_leads_forwards() {
 }
 
 #[test]
-fn a_gate_has_slots_and_when_closed_a_bulkhead() {
+fn gate_has_slots_and_a_bulkhead_if_closed() {
     let keys = "chainage_m = 10\nslot_width_m = 0.8\nslot_depth_m = 0.4";
     let mut oracle = Oracle::new(Shape::Circle(3.0));
     oracle.hollows.push(Box::new(|p, _| {
@@ -108,7 +108,7 @@ fn a_gate_has_slots_and_when_closed_a_bulkhead() {
 }
 
 #[test]
-fn a_fall_leaves_a_cavity_and_a_heap() {
+fn fall_leaves_a_cavity_and_a_heap() {
     let keys = "chainage_m = 20\nlength_m = 6\nwidth_m = 5\ndepth_m = 2\npieces = 40\nseed = 7";
     let text = feature("fall", keys)
         + &feature("debris", "chainage_m = 30\nlength_m = 4\nheight_m = 0.7\nname = \"spoil\"");
@@ -132,7 +132,7 @@ fn a_fall_leaves_a_cavity_and_a_heap() {
     assert_eq!(environment.feature_name(2), "");
 }
 
-/// Membership by the quadratic form, computed from the frame alone.
+/// Whether a point is in an ellipsoid, by the quadratic form in the ellipsoid's frame.
 fn in_ellipsoid(solid: &Solid, p: V3) -> bool {
     let Solid::Ellipsoid(frame, half) = solid else { panic!("a box") };
     let mut sum = 0.0;
@@ -207,7 +207,7 @@ fn index_finds_the_same_hits_as_a_full_search() {
 }
 
 #[test]
-fn scatter_is_reproducible_and_within_its_limits() {
+fn scattered_boulders_are_reproducible_and_within_their_limits() {
     let text = |seed: u64| {
         feature(
             "boulders",

@@ -1,4 +1,4 @@
-//! Meshes as walls and bodies, compared with the profile, closed forms and one another.
+//! Meshes as walls and bodies, compared with the profile, with closed forms and with one another.
 
 use std::fmt::Write as _;
 
@@ -6,14 +6,15 @@ use super::*;
 
 const RADIUS_M: f64 = 3.0;
 const SIDES: u32 = 240;
-/// Sagitta of the polygon's sides within its circle, per metre of radius.
+/// Largest distance between the sides of the polygon and its circumscribed circle, per metre of radius.
 const SAGITTA: f64 = 8.6e-5;
 
 fn circle() -> Profile {
     shapes::circle(RADIUS_M).unwrap()
 }
 
-/// A prism about the circle's axis as PLY, from x = 0 to `length_m` in `rings`; omits the faces of the given numbers.
+/// A prism about the axis of the circle as PLY, from x = 0 to `length_m` in `rings`, without the faces of the given
+/// numbers.
 fn tube(radius_m: f64, length_m: f64, rings: u32, without: &[u32]) -> String {
     let (mut vertices, mut faces, mut count) = (String::new(), String::new(), 0);
     for ring in 0..=rings {
@@ -35,7 +36,7 @@ fn tube(radius_m: f64, length_m: f64, rings: u32, without: &[u32]) -> String {
     )
 }
 
-/// A box from -half to half, as PLY.
+/// A box from -`half` to `half` on each axis, as PLY.
 fn cuboid(half: V3) -> String {
     let mut text = String::from(
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\n\
@@ -64,12 +65,12 @@ fn wall(file: &str) -> Environment {
     with(&table("file = \"t.ply\"\nrole = \"wall\"\nchainage_m = 40"), &[("t.ply", file)]).unwrap()
 }
 
-/// As [`super::cast`], without a distance limit.
+/// Casts a ray like [`super::cast`], without a distance limit.
 fn cast(environment: &Environment, origin: V3, direction: V3) -> Option<Hit> {
     environment.cast(to_point(origin), to_vec(direction), FARTHEST_M)
 }
 
-/// Range to the circle of this radius about the tunnel's axis, from inside.
+/// Range from inside to the circle of this radius about the tunnel's axis.
 fn to_circle(radius_m: f64, origin: V3, direction: V3) -> f64 {
     let [_, dy, dz] = direction;
     let (y, z) = (origin[1], origin[2] - RADIUS_M);
@@ -123,7 +124,7 @@ fn mesh_of_the_profile_gives_equal_ranges() {
     assert!(into > 1_000 && out > 1_000 && through > 300, "{into} {out} {through}");
     let far = environment.cast(to_point([45.0, 0.0, 3.0]), to_vec([0.0, 1.0, 0.0]), 2.9);
     assert!(far.is_none());
-    // Along the axis there is no wall, and outside there is no water.
+    // A ray along the axis meets no wall. A point outside the tunnel is not in water.
     assert!(cast(&environment, [20.0, 0.1, 3.0], [1.0, 0.0, 0.0]).is_none());
     assert!(cast(&environment, [45.0, 3.1, 3.0], [0.0, 1.0, 0.0]).is_none());
 }
@@ -132,7 +133,7 @@ fn mesh_of_the_profile_gives_equal_ranges() {
 fn no_ray_escapes_between_mismatched_mesh_and_profile() {
     for (radius_m, seed) in [(4.0, 61), (2.0, 62)] {
         let environment = wall(&tube(radius_m, 10.0, 2, &[]));
-        // Between the polygon's inner and outer circles a point may be inside or outside.
+        // Points between the inner and the outer circle of the polygon may be inside or outside.
         let is_within = |p: V3, share: f64| {
             let radius_m = if (40.0..=50.0).contains(&p[0]) { radius_m * share } else { RADIUS_M };
             math::hypot(p[1], p[2] - RADIUS_M) < radius_m
@@ -167,7 +168,7 @@ fn no_ray_escapes_between_mismatched_mesh_and_profile() {
 
 #[test]
 fn ragged_end_is_cut_to_the_closed_part() {
-    // Some faces of the first ring and of the last are missing: it is closed from x = 0.25 to 9.75.
+    // Some faces of the first and the last ring are missing. The mesh is closed from x = 0.25 m to 9.75 m.
     let ragged = tube(4.0, 10.0, 40, &[0, 1, 2, 50, 51, 39 * SIDES + 7]);
     let environment = wall(&ragged.replace("\n0.0 ", "\n-0.0 "));
     let placed =
@@ -185,7 +186,7 @@ fn ragged_end_is_cut_to_the_closed_part() {
 }
 
 #[test]
-fn a_wall_follows_the_axis_behind_a_bend() {
+fn mesh_wall_follows_the_axis_behind_a_bend() {
     let bend = "[[tunnel.axis]]\nlength_m = 5\n[[tunnel.axis]]\nradius_m = 20\nturn_deg = 40\n";
     let keys = "file = \"t.ply\"\nrole = \"wall\"\nchainage_m = 20";
     let file = tube(RADIUS_M, 10.0, 1, &[]);
@@ -211,7 +212,7 @@ fn a_wall_follows_the_axis_behind_a_bend() {
 }
 
 #[test]
-fn box_of_triangles_equals_a_block() {
+fn box_of_triangles_equals_a_solid_block() {
     let half = [0.5, 0.4, 0.3];
     let file = cuboid(half);
     let keys = "file = \"box.ply\"\nname = \"car\"\nchainage_m = 20\nacross_m = [0.5, 1.5]\n";
@@ -238,7 +239,7 @@ fn box_of_triangles_equals_a_block() {
         let Some(hit) = hit else { continue };
         let wall_m = cast(&bare, ray.origin, ray.direction).map_or(f64::INFINITY, |hit| hit.range_m);
         let wanted_m = block.meet(&ray).map_or(wall_m, |(t_m, _)| t_m.min(wall_m));
-        // A ray along a side may pass on either side of it.
+        // A ray that runs along a side of the box may hit the box or miss it.
         assert!((hit.range_m - wanted_m).abs() < 1e-9, "{ray:?} {hit:?} {wanted_m}");
         met += usize::from(hit.what == What::Feature(0));
     }

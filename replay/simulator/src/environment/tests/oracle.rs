@@ -1,13 +1,13 @@
-//! An independent model of the same environment: tests whether a point is water, and follows rays in small steps.
+//! An independent model of the same environment. It tests whether points are in water, and follows rays in small steps.
 
 use super::*;
 
-/// Steps along a ray, m.
+/// Length of a step along a ray, m.
 const STEP_M: f64 = 2e-3;
 /// Length over which rays are followed, m.
 pub(super) const FAR_M: f64 = 20.0;
 
-/// A profile whose wall has a closed form.
+/// A profile with a closed form for its wall.
 #[derive(Clone, Copy)]
 pub(super) enum Shape {
     Circle(f64),
@@ -15,15 +15,15 @@ pub(super) enum Shape {
     Trimmed(f64, f64),
 }
 
-/// Test of a point, given in the tunnel's frame and in the axis's chart.
+/// A test of a point, given in the tunnel's frame and as chainage, y and z.
 pub(super) type Test = Box<dyn Fn(V3, V3) -> bool>;
 
 pub(super) struct Oracle {
     pub(super) shape: Shape,
-    /// Length and signed curvature of the axis's pieces.
+    /// Length, m, and signed curvature, 1/m, of each piece of the axis.
     pub(super) axis: Vec<(f64, f64)>,
     pub(super) stations: Vec<(f64, f64)>,
-    /// Chainage, length, arc length, width, depth.
+    /// Chainage, length, arc length, width and depth of each bulge, m.
     pub(super) bulges: Vec<[f64; 5]>,
     pub(super) hollows: Vec<Test>,
     pub(super) solids: Vec<Test>,
@@ -47,9 +47,9 @@ impl Shape {
         }
     }
 
-    /// Distance of the wall from the reference point in a direction, and its arc length.
+    /// Distance from the reference point to the wall in a direction, and the arc length of that wall point.
     fn wall(self, [dy, dz]: [f64; 2]) -> (f64, f64) {
-        // From below, growing to the left.
+        // Angle from straight down, growing to the left.
         let angle = math::wrap(math::atan2(dy, -dz), math::TAU);
         match self {
             Self::Circle(radius) => (radius, radius * angle),
@@ -98,7 +98,7 @@ impl Oracle {
         }
     }
 
-    /// Point and heading of the axis, piece after piece.
+    /// Point and heading of the axis, summed piece by piece.
     pub(super) fn station(&self, s: f64) -> ([f64; 2], f64) {
         let (mut at, mut heading, mut rest) = ([0.0, 0.0], 0.0, s);
         for (length, curvature) in &self.axis {
@@ -106,7 +106,8 @@ impl Oracle {
                 break;
             }
             let part = rest.min(*length);
-            // The chord of an arc: its length by the half angle's sine, its direction half turned.
+            // The chord of an arc follows from the sine of half the turn. It points along the heading after half the
+            // turn.
             let half = curvature * part / 2.0;
             let chord = if half == 0.0 { part } else { 2.0 * math::sin(half) / curvature };
             at[0] += chord * math::cos(heading + half);
@@ -117,7 +118,7 @@ impl Oracle {
         ([at[0] + rest * math::cos(heading), at[1] + rest * math::sin(heading)], heading)
     }
 
-    /// Chainage and y by Newton's method from a guess.
+    /// Chainage and y of a point, by Newton's method from an estimate of the chainage.
     fn chart(&self, p: V3, guess: f64) -> V3 {
         if self.axis.is_empty() {
             return p;
@@ -138,7 +139,7 @@ impl Oracle {
         [s, (p[1] - at[1]) * math::cos(heading) - (p[0] - at[0]) * math::sin(heading), p[2]]
     }
 
-    /// Chart of any point, without a guess.
+    /// Chainage and y of a point, without an estimate.
     pub(super) fn search(&self, p: V3) -> V3 {
         let distance = |s: &f64| {
             let (at, _) = self.station(*s);
@@ -181,7 +182,7 @@ impl Oracle {
             && !self.solids.iter().any(|test| test(p, chart))
     }
 
-    /// First point along the ray that isn't water, from `from` on by steps.
+    /// Range of the first point along the ray that is not in water, from `from` on in steps.
     pub(super) fn range(&self, ray: &Ray, from: f64, far: f64, step: f64) -> Option<f64> {
         let mut chart = self.search(ray.at(from));
         let mut t = from;
@@ -189,7 +190,7 @@ impl Oracle {
             let next = t + step;
             let p = ray.at(next);
             chart = self.chart(p, chart[0]);
-            // Far off the axis, the nearest axis point may jump.
+            // Far from the axis, the nearest point of the axis may jump.
             if chart[1].abs() > 8.0 && !self.axis.is_empty() {
                 chart = self.search(p);
             }
@@ -207,10 +208,10 @@ impl Oracle {
         None
     }
 
-    /// Compares thousands of rays with this model; returns the number that met each feature.
+    /// Compares thousands of rays with this model. Returns the number of rays that hit each feature.
     ///
-    /// Two exceptions: steps of 2 mm may miss an object that a ray grazes, which smaller steps must then find. A graze
-    /// shorter than the environment's least step may be missed there.
+    /// Two differences are allowed. Steps of 2 mm may miss an object that a ray grazes, but smaller steps must then
+    /// find it. The environment may miss a graze that is shorter than its own smallest step.
     pub(super) fn compare(
         &self,
         environment: &Environment,
@@ -281,12 +282,12 @@ impl Oracle {
     }
 }
 
-/// An upright box about a point of a straight tunnel.
+/// A box with sides along the axes, about a point of a straight tunnel.
 pub(super) fn upright(least: V3, most: V3) -> Test {
     Box::new(move |p, _| (0..3).all(|k| (least[k]..=most[k]).contains(&p[k])))
 }
 
-/// An ellipsoid with axes along x, y, z.
+/// An ellipsoid with its axes along x, y and z.
 pub(super) fn ellipsoid(centre: V3, half: V3) -> Test {
     Box::new(move |p, _| {
         (0..3).map(|k| (p[k] - centre[k]) * (p[k] - centre[k]) / half[k] / half[k]).sum::<f64>() < 1.0

@@ -1,8 +1,8 @@
-//! Refused scenes, and the location stated in the error.
+//! Scenes that are refused, and the location stated in the error.
 
 use super::*;
 
-/// The error's text for a scene in the Ceran tunnel of 100 m.
+/// Text of the error for a scene in the Ceran tunnel with a length of 100 m.
 fn error(text: &str) -> String {
     try_parse(text, &shapes::ceran().unwrap()).err().map_or("accepted".to_owned(), |error| error.to_string())
 }

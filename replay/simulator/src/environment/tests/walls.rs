@@ -1,4 +1,4 @@
-//! The wall: as designed, scaled, displaced, in bends, and all combined.
+//! The wall: as designed, scaled, displaced, in bends, and with all of these combined.
 
 use super::oracle::{Oracle, Shape};
 use super::*;
@@ -65,7 +65,7 @@ fn bulge(b: &[f64; 5]) -> String {
 fn bulges_displace_the_wall() {
     for (seed, shape) in [(6, CERAN), (7, Shape::Rectangle(9.0, 4.0)), (8, Shape::Circle(3.0))] {
         let mut oracle = Oracle::new(shape);
-        // Inwards, outwards, over the floor's seam, overlapping, and thin.
+        // Bulges inwards, outwards, across the seam of the arc length on the floor, overlapping, and thin.
         oracle.bulges = vec![
             [10.0, 4.0, 9.0, 3.0, 1.0],
             [13.0, 6.0, 11.0, 6.0, -2.0],
@@ -80,12 +80,12 @@ fn bulges_displace_the_wall() {
 }
 
 #[test]
-fn a_thin_bulge_is_not_skipped() {
+fn thin_bulge_is_not_skipped() {
     let environment = parse(&bulge(&[10.0, 0.02, 0.0, 0.02, 0.02]), &shapes::ceran().unwrap());
     let centre = environment.design.reference();
     let hit = cast(&environment, [10.0, centre[0], centre[1]], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (centre[1] - 0.02)).abs() < 1e-9 && hit.what == What::Feature(0), "{hit:?}");
-    // Along the floor, through its middle and over it.
+    // Rays along the floor, through the middle of the bulge and over its top.
     let low = cast(&environment, [5.0, 0.0, 0.01], [1.0, 0.0, 0.0]).unwrap();
     assert!((low.range_m - 4.995).abs() < 1e-9 && low.what == What::Feature(0), "{low:?}");
     assert!(cast(&environment, [5.0, 0.0, 0.0201], [1.0, 0.0, 0.0]).is_none());
@@ -141,7 +141,7 @@ fn arc_length_is_on_the_design_profile_in_the_axis_chart() {
 }
 
 #[test]
-fn bump_is_equal_from_all_viewpoints_and_ends_with_its_stretch() {
+fn rough_wall_is_the_same_from_all_viewpoints_and_ends_with_its_stretch() {
     let profile = shapes::ceran().unwrap();
     let smooth = Environment::straight(profile.clone());
     let rough = parse("[tunnel]\n[[tunnel.rough]]\nfrom_m = 10\nto_m = 20\nsd_m = 0.03", &profile);
