@@ -121,7 +121,7 @@ impl ErrorClones {
     pub fn relative(&self, lag: DurNs) -> Option<Relative> {
         let newest = self.newest()?;
         let kept = self.clones.len();
-        // Over no time, the relative covariance is zero.
+        // For a lag of zero, the relative covariance is zero.
         let (mut newer_s, mut newer, mut newer_m2) = (0.0, Relative::default(), newest.chainage_m2());
         let wanted_s = lag.as_secs_f64();
         for back in 1..kept {

@@ -117,7 +117,7 @@ fn passes_of_a_silent_head_are_replaced_by_other_heads() {
     assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf, deaf, sound, sound]) - 3.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf]) - MOST_PASSES).abs() < 1e-12);
-    // If the other heads also lose returns, the losses of both kinds cost more than either kind alone.
+    // One head is silent and the others lose returns. Together these losses cost more than either of them alone.
     let lossy = LossRate::independent(0.1);
     let all = passes(0.1, &[deaf, lossy, lossy, lossy]);
     assert!(all > 2.05 && all > passes(0.1, &[lossy; 4]), "{all}");
@@ -133,7 +133,7 @@ fn required_passes_grow_continuously_with_losses() {
         for k in 0..4980 {
             let [mut low, mut high] = [k, k + 1].map(|k| 0.002 + 2e-4 * f64::from(k));
             assert!(at(high) >= at(low) - 1e-9, "steps of {t_y_m} m, {high}: {} to {}", at(low), at(high));
-            // The number rises steeply where a run becomes as wide as the target.
+            // The number of passes rises steeply where a run of lost pings becomes as wide as the target.
             for _ in 0..40 {
                 let middle = f64::midpoint(low, high);
                 if at(middle) - at(low) > at(high) - at(middle) { high = middle } else { low = middle }
