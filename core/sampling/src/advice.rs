@@ -376,7 +376,7 @@ impl Advisor {
         }
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
-            // A swing too wide for any speed is also too wide at a slightly different position.
+            // If the swing is too wide for any speed, it is also too wide at a slightly different position.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
             // The limiting step is unknown.
             Err(_) => (self.task.target_m, 0.0),
@@ -524,7 +524,7 @@ impl Advisor {
         RemainingTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }
 
-    /// Returns the first remedy that is enough by itself.
+    /// Returns the first remedy that alone makes the target possible.
     ///
     /// The order is: a steady heading, then the tunnel's centre if the steps are short enough there, then the fastest
     /// mode.

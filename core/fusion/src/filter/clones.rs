@@ -128,7 +128,7 @@ impl ErrorClones {
             let clone = self.back(back)?;
             let age_s = newest.at.since(clone.at).as_secs_f64();
             if age_s >= wanted_s {
-                // All soundings before the sudden gain in certainty are as uncertain as the older clone.
+                // All soundings before the chainage suddenly became more certain are as uncertain as the older clone.
                 if clone.is_unsure_beside(newer_m2) {
                     return Some(clone.relative);
                 }

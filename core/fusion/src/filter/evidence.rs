@@ -21,7 +21,7 @@ pub(super) const SURE_GAIN: f64 = 3.0;
 const EXPLAINS: f64 = 0.02;
 /// Unknowns of the vehicle's pose within a pose window of a few seconds: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
-/// Limit at which residuals are clipped in a comparison, m, because some echoes come from other objects.
+/// Limit at which residuals are clipped in a comparison, m, because some echoes come from objects other than the wall.
 const MOST_MISSED_M: f64 = 0.5;
 /// Minimum mean square residual of a source whose mount is doubted, m^2. Maximum ratio of the squared residuals with
 /// the alternative mount to those with the configured mount.

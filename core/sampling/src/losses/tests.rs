@@ -153,7 +153,7 @@ fn no_extra_passes_without_losses_or_without_a_speed() {
 
 /// Chance losses often make small holes and never large ones.
 ///
-/// Without chance losses, no hole is by chance.
+/// Without chance losses, no hole counts as caused by chance.
 #[test]
 fn hole_is_by_chance_if_enough_losses_can_coincide() {
     let hole = |hole_m: f64, rate: LossRate| sampled(0.1).is_by_chance(hole_m, 0.3, rate);
@@ -163,7 +163,7 @@ fn hole_is_by_chance_if_enough_losses_can_coincide() {
     let [never, runs] = [LossRate::default(), LossRate { share: 0.58, after_lost: 0.98 }];
     assert!(!hole(0.55, never));
     assert!(hole(2.0, runs), "most of each turn is lost in long runs");
-    // A hole that is by chance remains so with higher losses, and smaller holes are by chance as well.
+    // A hole that counts as caused by chance still counts so with higher losses, and so do smaller holes.
     for share in 1..9 {
         let rate = LossRate::independent(f64::from(share) / 10.0);
         let largest = |from: i32| (from..60).rev().find(|n| hole(f64::from(*n) / 20.0, rate)).unwrap_or(0);
