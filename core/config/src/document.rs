@@ -5,8 +5,8 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::ConfigError;
 
-/// Maximum length of a text, bytes: about a hundred times a long one. Parsing needs memory of many times this
-/// length.
+/// Maximum length of a text, bytes: about a hundred times the length of a long vehicle file. Parsing a text takes many
+/// times its length in memory.
 const MAX_TEXT_BYTES: usize = 1 << 20;
 
 /// A text and its file name.

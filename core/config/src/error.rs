@@ -92,8 +92,8 @@ impl fmt::Display for ConfigErrors {
 
 impl std::error::Error for ConfigErrors {}
 
-/// Maximum number of reported errors of a file. Nobody reads more, and a file that is not TOML may have one in each
-/// line.
+/// Maximum number of reported errors of a file. Nobody reads more errors, and a file that is not TOML may have an
+/// error in each line.
 pub(super) const MOST_ERRORS: usize = 100;
 
 /// Errors found so far in one document; `None` if reading stops at the first error.

@@ -64,7 +64,7 @@ impl<'a> Document<'a> {
     /// The table and its subtables note each error, and reading continues as if the key were absent. Unread keys
     /// are also errors.
     ///
-    /// Errors: all noted errors, and the one that `read` returned.
+    /// Errors: all noted errors, and the error that `read` returned.
     pub fn read<T>(
         self,
         read: impl FnOnce(&Section<'a>) -> Result<T, ConfigError>,
@@ -387,9 +387,9 @@ impl<'a> Section<'a> {
 
     /// Returns an error about `key` in this table, for checks that only the caller can make.
     ///
-    /// The new error may only follow from an earlier one. So it returns a noted error of the same key instead, if
-    /// there is one. If the key is absent from a table below the root, it returns a noted error of that table, or
-    /// an error about a key with a similar name.
+    /// The new error may be a mere consequence of an earlier error. So the result is the noted error of the same key,
+    /// if there is one. If the key is absent from a table below the root, the result is a noted error of that table,
+    /// or an error about a key with a similar name.
     pub fn invalid(&self, key: &str, problem: &str) -> ConfigError {
         let (name, value) = (self.full(key), self.table.get(key));
         let is_below = value.is_none() && !self.path.is_empty();
@@ -398,8 +398,8 @@ impl<'a> Section<'a> {
         follows.or_else(misnamed).unwrap_or_else(|| self.told(self.error(key, value, problem.to_owned())))
     }
 
-    /// Returns an error about this table as a whole; if an error of one of its keys is noted, returns that one
-    /// instead.
+    /// Returns an error about this table as a whole; returns the noted error of one of its keys instead, if there is
+    /// one.
     pub fn invalid_itself(&self, problem: &str) -> ConfigError {
         let error = || ConfigError {
             file: self.document.file.to_owned(),

@@ -1,4 +1,5 @@
-//! Detection of a sonar that reports the same range in every direction: its last echo, or an echo of its own frame.
+//! Detection of a sonar that reports the same range in every direction, for instance the range of its last echo or of
+//! an echo from its own frame.
 
 use serde::{Deserialize, Serialize};
 

@@ -17,7 +17,8 @@ pub struct Fix {
     pub relative: Relative,
     /// Error covariance relative to a much earlier visit to this position in the same stretch of navigation.
     pub revisit: Relative,
-    /// Number of the stretch of navigation. Between two stretches, the relative position error is unknown.
+    /// Number of the stretch of navigation, a time span in which the relative position of soundings is known. Between
+    /// two stretches, the relative position error is unknown.
     pub tie: u32,
     /// Number of times the estimate has become much more certain while it settled.
     ///

@@ -26,7 +26,7 @@ pub struct StuckSensor {
     last: Option<[f64; 3]>,
     /// Last non-zero difference between successive readings, by axis.
     steps: [f64; 3],
-    /// Share of differences whose sign is the reverse of the one before, from 0 to 1.
+    /// Share of differences whose sign is opposite to that of the previous difference, from 0 to 1.
     to_and_fro: f64,
     /// Mean length of runs of identical readings, and length of the present run, both in readings.
     usual_run: f64,

@@ -33,11 +33,11 @@ pub const MAX_MODES: usize = 8;
 
 /// Number of advice updates per recomputation of the alternatives.
 const ALTERNATIVES_EVERY: u32 = 25;
-/// Number of iterations between a speed and the position margin at that speed.
+/// Number of iterations that solve for the speed and its position margin, each of which depends on the other.
 const FALLS: u32 = 3;
 /// Speed below which the last direction of travel is kept, m/s.
 const UNDER_WAY_MPS: f64 = 0.02;
-/// Capacity for stretches of wall out of a head's reach.
+/// Capacity for stretches of wall outside a head's range limits.
 const OUT_OF_REACH: usize = 16;
 
 /// The largest speed found for a target.
@@ -186,8 +186,8 @@ impl Advisor {
     /// Returns the largest speed at which the predicted T_max stays within the target.
     ///
     /// The function inverts Eq. 16 with measured values: the turn period, step, number and phases of the heads, the
-    /// wall hidden by the vehicle or out of reach, position, attitude and swing. It propagates the phases to each
-    /// tested speed. `left_s` is the remaining time, if known.
+    /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. It propagates the phases
+    /// to each tested speed. `left_s` is the remaining time, if known.
     ///
     /// Heads apart along the hull keep their phases only in some intervals of speed. The result is the upper end of
     /// the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
@@ -376,7 +376,7 @@ impl Advisor {
         }
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
-            // A swing too wide for any speed is also too wide at a slightly different position.
+            // If the swing is too wide for any speed, it is also too wide at a slightly different position.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
             // The limiting step is unknown.
             Err(_) => (self.task.target_m, 0.0),
@@ -524,7 +524,7 @@ impl Advisor {
         RemainingTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }
 
-    /// Returns the first remedy that is enough by itself.
+    /// Returns the first remedy that alone makes the target possible.
     ///
     /// The order is: a steady heading, then the tunnel's centre if the steps are short enough there, then the fastest
     /// mode.

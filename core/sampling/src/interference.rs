@@ -1,4 +1,4 @@
-//! Interference: time for which two heads can hear each other, directly or from the same patch of wall.
+//! Interference: time for which two heads can receive each other's pings, directly or from the same patch of wall.
 
 use super::error::SamplingError;
 use super::head::HeadSpec;
@@ -9,7 +9,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
-/// Time per turn or sweep in which two heads can hear each other's pings.
+/// Time per turn or sweep in which two heads can receive each other's pings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
     /// The two heads by number.

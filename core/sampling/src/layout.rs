@@ -1,4 +1,4 @@
-//! Layouts of several heads: phase shift and sector offset (the paper's §5).
+//! Layouts of several heads: phase shift and sector offset (Jorge et al. 2021, §5).
 
 use super::error::{SamplingError, not_negative, positive};
 use super::head::{HeadProgram, HeadSpec, MAX_HEADS, faces_aft};
@@ -7,9 +7,9 @@ use headrace_geometry::math::{self, TAU};
 /// Layout of the heads of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeadLayout {
-    /// All heads rotate continuously, 2 pi / s apart where they pass the same place.
+    /// All s heads rotate continuously. At the moments when they pass the same place, their angles are 2 pi / s apart.
     PhaseShift,
-    /// Each head sweeps back and forth in a sector of 2 pi / s.
+    /// Each of s heads sweeps back and forth in a sector of 2 pi / s.
     SectorOffset,
 }
 

@@ -1,9 +1,9 @@
 //! Sampling theory: spacing of samples on the wall, layouts of heads, and the allowed speed.
 //!
-//! [`section`] and [`spacing`] contain the paper's closed forms, [`ring`] the general case by ray casting. [`layout`]
-//! and [`schedule`] define how several heads turn, [`passes`] how often they pass a place. [`swing`] adds the effect
-//! of the vehicle's own rotation, and [`losses`] that of lost returns. [`advice`] combines them for the pilot during
-//! the dive, [`plan`] for the engineer before it.
+//! [`section`] and [`spacing`] contain the closed forms of Jorge et al. 2021, [`ring`] the general case by ray
+//! casting. [`layout`] and [`schedule`] define how several heads turn, [`passes`] how often they pass a place.
+//! [`swing`] adds the effect of the vehicle's own rotation, and [`losses`] that of lost returns. [`advice`] combines
+//! them for the pilot during the dive, [`plan`] for the engineer before it.
 //!
 //! ```
 //! use headrace_sampling::head::Turn;

@@ -111,8 +111,8 @@ impl Sampled {
 
     /// Whether a hole of this diameter, m, may have been caused by chance.
     ///
-    /// `along_m` is the distance between passes, and `rate` the loss rate. If the hole is not by chance, the wall
-    /// there gives no returns at any speed.
+    /// `along_m` is the distance between passes, and `rate` the loss rate. If chance is excluded, the wall there gives
+    /// no returns at any speed.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn is_by_chance(&self, hole_m: f64, along_m: f64, rate: LossRate) -> bool {

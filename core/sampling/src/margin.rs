@@ -17,13 +17,13 @@ const MOST_SHARE: f64 = 0.2;
 /// Share of the time between heads apart along the hull that counts towards the time between passes.
 ///
 /// Only some neighbouring passes are by heads apart, and holes between these passes grow by less than the heads'
-/// separation. With this share, D is within two of its standard deviations 93 % of the time, over the dives of
-/// `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share of 0, and
-/// 99 % with a share of 1.
+/// separation. With this share, a hole's size D is within two of its standard deviations 93 % of the time, over the
+/// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share of
+/// 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
-/// The longest time between heads apart along the hull, seconds.
+/// Limit for the time until the rearmost head reaches the position of the foremost head, seconds.
 const LONGEST_APART_S: f64 = 20.0;
 
 /// Time over which position errors accumulate between neighbouring passes of a place, s.
@@ -125,7 +125,7 @@ impl ExpectedErrors {
 pub enum Margin {
     /// No cause but the distance between turns.
     Geometry,
-    /// Wall that the vehicle hides from some of its heads, or that is out of their reach.
+    /// Wall that the vehicle hides from some of its heads, or that is outside their range limits.
     Hidden,
     /// Heads that are not evenly phased, or that are side by side.
     Phase,

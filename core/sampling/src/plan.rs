@@ -26,8 +26,8 @@ pub use wall::{PatternSample, WallPlace};
 
 /// Share of the largest speed for which heads should be started.
 ///
-/// A pilot keeps a speed within 5 %, and heads apart along the hull are in phase only near the planned speed. Source:
-/// field.md, "Driven".
+/// A pilot keeps a speed within 5 %, and heads apart along the hull are in phase only near the planned speed. See
+/// docs/why/field.md.
 pub const HELD_SHARE: f64 = 0.95;
 /// Number of soundings per ring: soundings 0.1 degrees apart cover many start angles of each step.
 const RING: u32 = 3600;
@@ -472,7 +472,7 @@ fn views(
     pose: &Pose,
     rings: &[Ring],
 ) -> Result<Vec<View>, SamplingError> {
-    /// Capacity for stretches of wall out of reach: every other sounding.
+    /// Capacity for stretches of wall outside the range limits: every other sounding.
     const OUT_OF_REACH: usize = RING as usize / 2;
     let programs = layout::programs(specs, inspection.layout, 0.0)?;
     let mut views = Vec::with_capacity(specs.len());

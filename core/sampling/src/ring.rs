@@ -122,7 +122,7 @@ impl Sounding {
         math::hypot(other.beam.x() - self.beam.x(), around_m)
     }
 
-    /// Straight-line distance to another sounding of the same head, m: the paper's T_y.
+    /// Straight-line distance to another sounding of the same head, m: T_y of Jorge et al. 2021.
     pub fn chord_m(&self, other: &Self) -> f64 {
         (other.beam + -self.beam).norm()
     }
@@ -132,7 +132,8 @@ impl Sounding {
 #[derive(Debug, Clone, Default)]
 pub struct Ring {
     soundings: Vec<Sounding>,
-    /// Signed arc lengths from the first sounding to each sounding, m, then that of the whole turn.
+    /// Signed arc lengths from the first sounding to each sounding, m. The last entry is the arc length of the whole
+    /// turn.
     ///
     /// Values are negative if the head turns against arc length.
     way_m: Vec<f64>,
@@ -254,7 +255,7 @@ impl Ring {
     ///
     /// The distance is the largest over all angles of the first ping. Zero without soundings.
     ///
-    /// Source: Eq. 6 where the paper's assumptions hold.
+    /// Source: Jorge et al. 2021, Eq. 6, where its assumptions hold.
     pub fn largest_step_m(&self, stride: usize) -> f64 {
         self.steps_m(stride).fold(0.0, f64::max)
     }

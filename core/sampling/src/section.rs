@@ -1,4 +1,4 @@
-//! The paper's equations for one cross-section: a rotating head on a vehicle at rest.
+//! Equations of Jorge et al. 2021 for one cross-section: a rotating head on a vehicle at rest.
 //!
 //! The paper states the equations for a head midway between floor and crown of a tunnel of height b. They hold for
 //! any flat or circular wall. The functions here take the distance h to the wall, which is b / 2 in the paper's case.
@@ -182,7 +182,7 @@ mod tests {
         assert!((t_yp_m(34.17, 400).unwrap() - 0.085_425).abs() < 1e-12);
         assert!((overlap(f64::to_radians(2.4), f64::to_radians(0.3)).unwrap() - 8.0).abs() < 1e-12);
         assert!((range_resolution_m(0.0, 10.0, 1000).unwrap() - 0.01).abs() < 1e-15);
-        // The paper's Fig. 15 shows about 25 cm at 10 m.
+        // Jorge et al. 2021, Fig. 15, shows about 25 cm at 10 m.
         assert!((beam_width_m(10.0, f64::to_radians(1.4)).unwrap() - 0.244_358).abs() < 1e-6);
     }
 

@@ -1,4 +1,4 @@
-//! The paper's equations for a rotating head on a moving vehicle: the spacing of its samples.
+//! Equations of Jorge et al. 2021 for the spacing of samples: a rotating head on a moving vehicle.
 
 use super::error::{SamplingError, not_negative, positive};
 use super::head::Turn;

@@ -180,7 +180,8 @@ pub trait Device: Send + Sync {
 
     /// Writes the packet without its optional payload to `shorter` and returns `true`.
     ///
-    /// Returns `false` if the packet has no such payload, or if these bytes alone do not show that it has.
+    /// Returns `false` if the packet has no such payload, or if the payload cannot be recognised from these bytes
+    /// alone.
     fn without(&self, _what: OptionalPayload, _packet: &[u8], _shorter: &mut Vec<u8>) -> bool {
         false
     }

@@ -269,7 +269,7 @@ impl Edge {
         let shift = self.shift(stamp);
         if shift != Shift::None {
             if shift == Shift::Ahead && stamp.device_ns < LONGEST_QUEUE_NS {
-                // The earlier stretches were queued instead: the epoch began while a queue was full.
+                // The earlier stamps were the queued ones, because the epoch began while a queue was full.
                 self.len = 0;
             } else {
                 let since = *self.shifted_since_ns.get_or_insert(stamp.device_ns);

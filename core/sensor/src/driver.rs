@@ -73,7 +73,8 @@ pub struct DeviceHealth {
 
 /// Host side of one device's line.
 pub trait Driver: Send {
-    /// Reacts to the line being opened or reopened. The device may have been replaced or switched off meanwhile.
+    /// Reacts to the line being opened or reopened. The device may have been replaced or switched off while the line
+    /// was closed.
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
     /// Reacts to the line being closed. Bytes sent from now on are discarded.
@@ -98,7 +99,7 @@ pub trait Driver: Send {
     /// Performs the action that is due at the time given by [`Driver::due`].
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// Whether a response is pending. Other drivers on the same line must not transmit meanwhile.
+    /// Whether a response is pending. While it is pending, other drivers on the same line must not transmit.
     fn awaits(&self) -> bool {
         false
     }

@@ -41,14 +41,14 @@ impl Default for CoverageConfig {
 /// The radius is that of a circle with the profile's perimeter.
 const CONTRADICTION_SHARE: f64 = 0.2;
 const MOST_CONTRADICTION_M: f64 = 0.5;
-/// Maximum number of places that stand for samples on all openings together.
+/// Maximum number of samples that fill all openings together.
 const MAX_PLACES: i64 = 1_000_000;
 
 impl CoverageConfig {
     /// Returns the default deviation above which a sample contradicts a profile of this perimeter, m.
     ///
-    /// The value is larger than a lining, or the error of a design that is 6 % off. It is smaller than the difference
-    /// from another tunnel.
+    /// The value is larger than a lining, or the error of a design that is 6 % off. It is smaller than the deviation
+    /// of another tunnel.
     pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }

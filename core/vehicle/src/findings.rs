@@ -1,6 +1,6 @@
 //! Checks of a vehicle file as a whole, after its keys have been read.
 //!
-//! The checks find connections that cannot be shared, walls out of reach, and heads out of step.
+//! The checks find connections that cannot be shared, walls outside the heads' range limits, and heads out of step.
 
 use core::fmt;
 

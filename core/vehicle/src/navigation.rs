@@ -23,8 +23,8 @@ const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
 /// Allowed lengths of an epoch and of a window, s; the filter's buffers suffice for both.
 ///
-/// With epochs of 0.5 s, the estimate of a field dive was off by metres. With 0.2 s, the error was no larger than
-/// with 0.1 s (Navigation trade of `headrace cost`).
+/// With epochs of 0.5 s, the estimate of a field dive was off by metres. With 0.2 s, the error was no larger than with
+/// 0.1 s (trade-off "Navigation" of `headrace cost`).
 const EPOCH_S: RangeInclusive<f64> = 0.02..=0.2;
 const WINDOW_S: RangeInclusive<f64> = 0.1..=1.0;
 

@@ -14,8 +14,8 @@ const MEMORY: u32 = 40;
 const LEAST_AGREEING: f64 = 0.35;
 /// Standard deviations added for a lost quantity, m, m/s, radians.
 ///
-/// They apply to position and velocity across the tunnel, to those along it (`LOST_WAY`), to the attitude, and to
-/// the scale of ranges.
+/// `LOST_M` and `LOST_MPS` apply to position and velocity across the tunnel. `LOST_WAY_M` and `LOST_WAY_MPS` apply to
+/// position and velocity along it. The others apply to the attitude and to the scale of ranges.
 const LOST_M: f64 = 1.5;
 const LOST_MPS: f64 = 1.0;
 const LOST_WAY_M: f64 = 100.0;
@@ -81,8 +81,8 @@ impl Agreement {
         if wall {
             add(variances, POSITION + 1..POSITION + 3, LOST_M);
             add(variances, VELOCITY + 1..VELOCITY + 3, LOST_MPS);
-            // A tilt error also moves the estimate, through gravity. The cause of the tilt error has also turned
-            // the yaw, and the compass deviation may have absorbed that turn.
+            // A tilt error also moves the estimate, through gravity. The cause of the tilt error has probably also
+            // caused a yaw error, and the compass deviation may have absorbed it.
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
             add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
             add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);

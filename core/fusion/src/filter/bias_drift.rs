@@ -18,7 +18,7 @@ const RAISES_PER_S: f64 = 2.0;
 /// Mean ratio below which a raised noise decays, and the time constant of this decay, s.
 const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
-/// Initial factor: the biases of a unit count as restless until its readings show otherwise.
+/// Initial factor: the biases of a unit are assumed to drift fast until its readings show otherwise.
 const AT_FIRST: f64 = 1e3;
 /// Random walk of the worst supported unit, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
 const MOST_RATE: f64 = 4.3e-4;
@@ -42,7 +42,7 @@ impl Default for BiasDrift {
     }
 }
 
-/// Returns the largest factor for a process. It makes the process as restless as in the worst unit.
+/// Returns the largest factor for a process. With it, the bias drifts as fast as in the worst supported unit.
 fn most(wander: GaussMarkov, worst: f64) -> f64 {
     let density = wander.density();
     (worst * worst / density).max(1.0)

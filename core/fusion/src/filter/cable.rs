@@ -16,14 +16,14 @@ use headrace_sensor::reading::SourceId;
 const RECENT_S: f64 = 1.0;
 /// Mean innovation at which a dispute begins, as a multiple of the mean's standard deviation for white innovations.
 ///
-/// For limits from 3 to 6, about the same number of seeded dives is silent. With 4, a slack of seven times the
-/// declared size causes a dispute with a sound counter.
+/// For limits from 3 to 6, about the same number of seeded dives has an unreported error. With 4, a slack of seven
+/// times the declared size causes a dispute with a sound counter.
 const DISPUTED_SDS: f64 = 5.0;
 /// Limit at which each innovation is clipped, in standard deviations.
 const MOST_SDS: f64 = 6.0;
 /// Smallest innovation that begins a dispute, m.
 const LEAST_M: f64 = 0.01;
-/// Time for which the count of a counter on a lively cable must be unchanged for the counter to count as stuck.
+/// Time after which an unchanged count means a stuck counter, if slack otherwise moves the counter constantly.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
 /// Counts that differ by less than this are equal, m.
 const SAME_COUNT_M: f64 = 1e-6;
@@ -32,11 +32,12 @@ const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
 /// Maximum sd of the innovation at which an agreeing reading proves that nothing was lost, m.
 const SURE_M: f64 = 0.3;
-/// Maximum difference at which a reading has caught up: this share of the vehicle's distance since, plus this
-/// length, m.
+/// Maximum difference at which the counter has caught up with the vehicle, m: this share of the vehicle's distance
+/// since the dispute began, plus this length.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
-/// Maximum difference at which the counter runs like the vehicle: this share of the distance, plus this length, m.
+/// Maximum difference at which the counter follows the vehicle's motion, m: this share of the distance, plus this
+/// length.
 ///
 /// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
@@ -47,7 +48,7 @@ const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
 /// Difference of the hypotheses at which the estimate is given up, m; includes the sd of the innovation.
 ///
-/// The counter must also have run by `ALIVE_M` since then, which shows that its wheel turns.
+/// The counter must also have counted `ALIVE_M` since the difference was reached, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 
@@ -126,7 +127,7 @@ pub struct Cable {
 struct Dispute {
     /// The first withheld reading.
     first: CableReading,
-    /// Reading since which the counter runs like the vehicle.
+    /// First reading of the present series in which the counter follows the vehicle's motion.
     same_from: CableReading,
     /// Time since which readings agree again.
     agreeing_from: Option<MonoNs>,
@@ -186,8 +187,7 @@ impl Cable {
         if (changed.shown_m - reading.shown_m).abs() > SAME_COUNT_M {
             self.changed = Some(*reading);
         }
-        // On a lively cable, slack keeps moving the counter. A count that suddenly stops changing means a stuck
-        // wheel.
+        // If slack constantly moves the counter, a count that suddenly stops changing means a stuck wheel.
         if reading.is_lively && lasts(&changed, STANDS_FOR) {
             return Some(changed);
         }
@@ -345,7 +345,8 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // A sum of equal corrections that decays over a second contains 1 / (e^0.1 - 1) of them.
+        // Ten equal corrections a second are summed, and the sum decays over a second. It tends to 1 / (e^0.1 - 1)
+        // corrections.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
@@ -406,8 +407,8 @@ mod tests {
         }
     }
 
-    /// Beyond a metre, the estimate is given up if the counter runs. If the counter is stationary, the estimate is
-    /// kept.
+    /// Beyond a difference of one metre, the estimate is given up if the counter runs. If the counter is stationary,
+    /// the estimate is kept.
     #[test]
     fn lost_estimate_restarts_from_a_running_counter() {
         let (_, used) = ends(2.0, 0.3, 1.1).unwrap();

@@ -121,14 +121,14 @@ impl ErrorClones {
     pub fn relative(&self, lag: DurNs) -> Option<Relative> {
         let newest = self.newest()?;
         let kept = self.clones.len();
-        // Over no time, the relative covariance is zero.
+        // For a lag of zero, the relative covariance is zero.
         let (mut newer_s, mut newer, mut newer_m2) = (0.0, Relative::default(), newest.chainage_m2());
         let wanted_s = lag.as_secs_f64();
         for back in 1..kept {
             let clone = self.back(back)?;
             let age_s = newest.at.since(clone.at).as_secs_f64();
             if age_s >= wanted_s {
-                // All soundings before the sudden gain in certainty are as uncertain as the older clone.
+                // All soundings before the chainage suddenly became more certain are as uncertain as the older clone.
                 if clone.is_unsure_beside(newer_m2) {
                     return Some(clone.relative);
                 }

@@ -13,19 +13,20 @@ use headrace_geometry::math;
 ///
 /// They are kept for a while because a counter fails some time before the failure is noticed.
 const RECENT_S: f64 = 1.0;
-/// Minimum time for which an unchanged count is a stop, s. Shorter times may come from slow motion and coarse
-/// steps.
+/// Minimum time after which an unchanged count is a stop of the vehicle, s. Shorter pauses may come from slow motion
+/// and coarse steps.
 const STANDS_S: f64 = 2.0;
 /// Standard deviation of the possible loss, as a share of the corrections.
 ///
-/// In one of ten such cases the wheel is stuck, so the variance of the loss is a tenth of the squared corrections.
+/// The wheel is assumed to be stuck in one of ten such cases, so the variance of the loss is a tenth of the squared
+/// corrections.
 const STUCK_SHARE: f64 = 0.3;
 /// Corrections up to this many predicted standard deviations count as chance.
 ///
-/// With 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %. With 1,
-/// stuck wheels stay silent in 9 of 800 dives, instead of 6.
+/// With 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %. With 1, stuck
+/// wheels cause unreported errors in 9 of 800 dives, instead of 6.
 const CHANCE_SDS: f64 = 0.5;
-/// Time for which a possible loss counts between passes, s: about one turn of a head.
+/// Time for which a possible loss adds to the relative error between passes, s: about one turn of a head.
 ///
 /// Only the corrections in the first such period of a stationary count are added up. Later corrections of a
 /// hovering vehicle say nothing about the wheel.
@@ -43,7 +44,8 @@ pub struct CounterCorrections {
     by_chance: [f64; 2],
     /// Time for which the count has been stationary, s.
     stood_s: f64,
-    /// Standard deviations of the possible loss, m: since the count became stationary, and between passes.
+    /// Standard deviations of the possible loss, m: of the chainage since the count became stationary, and of the
+    /// relative position between passes.
     lacks_m: f64,
     lost_m: f64,
     /// Variance of the possible permanent loss since the last call of `take_slipped_m2`, m^2.
@@ -198,8 +200,8 @@ mod tests {
         assert!((corrections.lost_m() - first_m).abs() < 0.004, "{}", corrections.lost_m());
     }
 
-    /// The possible loss counts between passes for one turn of a head, and permanently in the position. A slow
-    /// vehicle with coarse steps makes short stops, which do not count.
+    /// The possible loss adds to the relative error between passes for one turn of a head. It adds to the error of the
+    /// position permanently. A slow vehicle with coarse steps makes short stops, which do not count.
     #[test]
     fn possible_loss_of_a_stop_remains_when_the_count_changes() {
         for (readings, slips) in [(15, false), (50, true)] {

@@ -1,9 +1,8 @@
 //! Decides whether the cable counter still counts from its first zero.
 //!
-//! A count that restarts from zero gives no position. The counter may have been plugged in again or replaced, or
-//! the log may continue with an earlier time of a dive. The chainage is kept only if the counter alone was silent
-//! and the other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter begins again
-//! from zero".
+//! A count that restarts from zero gives no position. The counter may have been plugged in again or replaced, or the
+//! log may jump back to an earlier time of a dive. The chainage is kept only if the counter alone was silent and the
+//! other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter begins again from zero".
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::TetherLength;

@@ -281,7 +281,8 @@ mod tests {
         compared_at(10, 1, lasts_s, (cable_m, log_mps, estimate_m))
     }
 
-    /// Does the same with `rate_hz` counter readings a second, and one log reading for several of them.
+    /// Compares distances as `compared` does. There are `rate_hz` counter readings a second, and one log reading for
+    /// every `log_every` of them.
     fn compared_at(
         rate_hz: u32,
         log_every: u32,
@@ -330,7 +331,8 @@ mod tests {
     fn velocity_log_wrong_by_a_fifth_is_reported_with_the_difference() {
         let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
         let doubt = doubt.unwrap();
-        // The difference is a fifth of the 12 m in a minute. It is smaller while the vehicle is slow.
+        // The vehicle travels about 12 m in a window of a minute, and the log shows a fifth too much. The difference
+        // is smaller while the vehicle is slow.
         assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
         assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
     }

@@ -390,7 +390,7 @@ impl Eskf {
             source.noise_level.note_share((innovation * innovation - of_estimate) / declared, is_near);
         }
         let relative = source.noise_level.relative(nis.min(settings.gate));
-        // Ranges of heads are excluded, because rocks change them in the same way as restless gyros would.
+        // Ranges of heads are excluded, because rocks change them in the same way as drifting gyro biases would.
         if kind != SensorKind::Head {
             self.unrest.note([part(RATE_BIAS), part(FORCE_BIAS)], variance, relative);
         }

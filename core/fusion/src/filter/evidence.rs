@@ -19,16 +19,16 @@ pub(super) const SURE_GAIN: f64 = 3.0;
 ///
 /// It corresponds to a parameter that changes ranges by a seventh of their noise.
 const EXPLAINS: f64 = 0.02;
-/// Unknowns of the vehicle's pose within a spell: position across and up, roll, pitch and yaw.
+/// Unknowns of the vehicle's pose within a pose window of a few seconds: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
-/// Limit at which residuals are clipped in a comparison, m, because some echoes come from other objects.
+/// Limit at which residuals are clipped in a comparison, m, because some echoes come from objects other than the wall.
 const MOST_MISSED_M: f64 = 0.5;
-/// Minimum mean square residual of a source whose mount is doubted, m^2; maximum ratio of the residual squares with
-/// the alternative to those without it.
+/// Minimum mean square residual of a source whose mount is doubted, m^2. Maximum ratio of the squared residuals with
+/// the alternative mount to those with the configured mount.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
-/// Sums of one parameter within a spell, and its products with the vehicle's pose.
+/// Sums of one parameter within a pose window, and its products with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Line {
     pub(super) by_pose: [f64; POSE],

@@ -23,7 +23,7 @@ const MOST_RAD: f64 = 0.3;
 /// Number of sums: pattern squared, pattern times derivative, derivative squared, and both times the residual.
 const SUMS: usize = 5;
 
-/// Sums of one head and one axis within a spell, and their products with the vehicle's pose.
+/// Sums of one head and one axis within a pose window, and their products with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltSums {
     pattern_by_pose: [f64; POSE],

@@ -181,7 +181,7 @@ impl Leg {
 
     /// Returns the leg with this noise and this slack.
     ///
-    /// `unrest` contains the factors of the process noise of gyro and accelerometer biases.
+    /// `unrest` contains the factors by which the process noise of gyro and accelerometer biases is multiplied.
     #[must_use]
     pub fn with_noise(self, unrest: [f64; 2], slack: GaussMarkov) -> Self {
         Self { unrest, slack: [slack.reach, slack.time_s], ..self }

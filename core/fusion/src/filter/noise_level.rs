@@ -22,7 +22,7 @@ const LEAST_OF_HEAD: f64 = 0.15;
 /// Rejected innovations come from rocks and stray echoes. If the wall differs from its design, there are many of
 /// them.
 const MOST_UNUSED: f64 = 2.0;
-/// Number of measurements in the mean, and the minimum number for a statement.
+/// Number of measurements in the mean, and the minimum number before the mean is used.
 const MEMORY: u32 = 200;
 const FEW: u32 = 30;
 /// Number of used returns in a turn of a head, one every three degrees. Fewer returns do not cover the whole wall.

@@ -12,7 +12,7 @@ use headrace_geometry::math;
 /// Limits for georeferencing: standard deviations of the position in the section, m, and of yaw, radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
-/// Limit for the chainage, relative to the previous pass of the heads and absolute, m.
+/// Limit for the standard deviation of the chainage, both relative to the previous pass of the heads and absolute, m.
 const ALONG_LIMIT_M: f64 = 1.0;
 
 /// Standard deviations of an estimate.

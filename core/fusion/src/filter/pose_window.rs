@@ -1,4 +1,4 @@
-//! Sums of a spell for the vehicle's pose and all fitted parameters.
+//! Sums over a pose window of a few seconds, for the vehicle's pose and all fitted parameters.
 //!
 //! Only residuals that the pose does not explain count for the parameters.
 
@@ -9,10 +9,10 @@ use super::head_tilt::TiltSums;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 
-/// Prior standard deviations of the pose within a spell, m and radians.
+/// Prior standard deviations of the pose within a pose window, m and radians.
 const POSE_SD: [f64; POSE] = [0.3, 0.3, 0.005, 0.01, 0.02];
 
-/// Sums over the readings of a spell.
+/// Sums over the readings of a pose window.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct PoseWindow {
     pub(super) begun: Option<MonoNs>,

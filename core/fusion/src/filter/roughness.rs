@@ -10,7 +10,7 @@ use super::settings::Settings;
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of bumps in the mean, and the number of bumps for which the declared noise counts.
+/// Maximum number of bumps in the running mean, and the weight of the declared noise in it, as a number of bumps.
 const MEMORY: f64 = 30.0;
 const DECLARED: f64 = 1.0;
 /// Limit at which the square of a sum is clipped, as a factor of its variance, because one outlier is no bump.
@@ -45,7 +45,7 @@ pub(super) struct Look {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Roughness {
     factor: f64,
-    /// Number of bumps seen so far, up to the limit of the mean.
+    /// Number of bumps averaged in `factor`, at most `MEMORY`.
     seen: f64,
     looks: [Option<Look>; ECHOSOUNDERS],
 }

@@ -1,8 +1,8 @@
 //! Detection of wrong settings from the residuals of ranges against the design.
 //!
-//! Each setting is a parameter that is fitted to the residuals. Within a spell of a few seconds, the vehicle's pose
-//! explains as much of the residuals as it can, and the parameters explain the rest. The sums of spells are added
-//! up over blocks of distance. Blocks are about as independent as the wall allows, so their scatter gives the
+//! Each setting is a parameter that is fitted to the residuals. Within a pose window of a few seconds, the vehicle's
+//! pose explains as much of the residuals as it can, and the parameters explain the rest. The sums of pose windows are
+//! added up over blocks of distance. Blocks are about as independent as the wall allows, so their scatter gives the
 //! uncertainty of a parameter. Summary: `docs/why/navigation.md`, "Settings in doubt".
 //!
 //! A residual is r = x b, with x the error of the setting and b as follows (t, A, p: as in the range's derivatives):
@@ -30,7 +30,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Length of a spell: about the time for which a filter with wrong ranges keeps its position.
+/// Length of a pose window: about the time for which a filter with wrong ranges keeps its position.
 const SPELL: DurNs = DurNs(2_000_000_000);
 /// Minimum duration and distance of a block, and the maximum duration. A block that is too short by then is
 /// dropped.
@@ -154,7 +154,7 @@ struct Look {
     sd_m: f64,
 }
 
-/// A block: its start, its number of readings, and the sums of its spells.
+/// A block: its start, its number of readings, and the sums of its pose windows.
 ///
 /// The vehicle's pose is already eliminated from the sums.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

@@ -115,9 +115,9 @@ pub struct Settings {
     pub learns: bool,
     /// Share of a wall range's correction of attitude and related errors that is applied.
     ///
-    /// With 0, ranges do not correct the attitude; 1 is the optimal estimate. Coverage depends on the attitude of
-    /// one pass relative to the next. The gyros show that better than walls do, because walls differ in shape from
-    /// the design. A smoother needs 1: [`crate::smooth::two_filters`].
+    /// With 0, ranges do not correct the attitude; 1 is the optimal estimate. Coverage depends on the attitude of one
+    /// pass relative to the next. Gyros measure this relative attitude more accurately than ranges do, because walls
+    /// differ in shape from the design. A smoother needs 1: [`crate::smooth::two_filters`].
     pub wall_share: f64,
 }
 

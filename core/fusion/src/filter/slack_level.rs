@@ -52,17 +52,17 @@ const LEVELS_S: f64 = 100.0;
 const MOST_OFF_RAD: f64 = 0.3;
 /// Maximum size of a third difference at which counter and inertial motion agree, in multiples of the usual size.
 ///
-/// `FEW` is the number of differences needed to judge, and `ENOUGH` the number for a known size.
+/// Agreement is judged from `FEW` differences on. From `ENOUGH` differences on, their usual size counts as known.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
-/// Until slack has been compared, it is assumed to be faster than declared by this factor.
+/// Until the first comparison, slack is assumed to be faster than declared by this factor.
 const AT_FIRST: f64 = 2.0;
 /// Third differences up to `AGREES_SDS` times this are usual, m. A lever arm or a tilting vehicle causes them.
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// Size of third differences over a second above which slack counts as lively, in counter steps.
+/// Size of third differences over a second above which slack constantly moves the counter, in counter steps.
 const LIVELY_STEPS: f64 = 4.0;
 /// Time between two comparisons of the averages with the model.
 const COMPARES: DurNs = DurNs(1_000_000_000);
@@ -254,8 +254,8 @@ impl SlackEstimate {
         let least_reach =
             seen_m2.iter().map(|seen| math::sqrt(seen.max(0.0) / 20.0)).fold(declared.reach, f64::max);
         let most_reach = MOST_REACH_M.max(declared.reach);
-        // A faster slack gets a larger standard deviation. Slack that is a sine needs it, because its spectrum has
-        // a peak.
+        // A faster slack gets a larger standard deviation. Sinusoidal slack requires this, because its spectrum has a
+        // peak.
         let model = |time_s: f64| {
             let reach = declared.reach * math::sqrt(math::sqrt(math::sqrt(declared.time_s / time_s)));
             GaussMarkov { reach: reach.max(least_reach).min(most_reach), time_s }

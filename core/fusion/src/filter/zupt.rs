@@ -45,8 +45,8 @@ pub struct RestDetector {
     rested: u32,
     /// Time for which the cable has been stationary although the vehicle is not at rest, s.
     floated: u32,
-    /// Whether the vehicle floats: it was not at rest for long on a stationary cable, and it has not been at rest
-    /// since.
+    /// Whether the vehicle floats. It was in motion for a long time while the cable was stationary, and has not been
+    /// at rest since.
     floats: bool,
     /// Time of the first estimate.
     asks_from: Option<MonoNs>,
@@ -141,7 +141,8 @@ impl RestDetector {
         })
     }
 
-    /// Whether the vehicle is at rest: gyros and accelerometers have been steady for long, and so has the cable.
+    /// Whether the vehicle is at rest: gyros and accelerometers have been steady for long, and the cable has been
+    /// stationary.
     pub fn is_still(&self) -> bool {
         self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still && self.cable_rests()
     }
@@ -209,8 +210,8 @@ mod tests {
         );
     }
 
-    /// If the cable is wound in by half metres, it pauses for longer than the means take, and the vehicle moves
-    /// meanwhile.
+    /// If the cable is wound in by half metres, its pauses are longer than the averaging windows for rest, and the
+    /// vehicle moves during the pauses.
     ///
     /// The vehicle is at rest once the cable has been stationary for twice the time between the last pulls.
     #[test]

@@ -42,7 +42,7 @@ impl Journal {
         self.piece = self.piece.saturating_add(1);
     }
 
-    /// Counts that the clock has been set back.
+    /// Counts a reset of the clock to an earlier time.
     pub fn clock_set(&mut self) {
         self.clock = self.clock.saturating_add(1);
     }

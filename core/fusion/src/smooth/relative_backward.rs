@@ -50,7 +50,7 @@ impl Later {
 
     /// Adds an epoch that waits for the epoch one `gap` earlier.
     ///
-    /// If there is no room, it removes the epoch that has waited longest and returns its answer.
+    /// If there is no room, it removes the epoch that has waited longest and returns its relative covariance.
     pub fn note(
         &mut self,
         number: usize,
@@ -66,7 +66,8 @@ impl Later {
         first
     }
 
-    /// Moves the backward pass to an earlier epoch, and answers the epochs that waited for it.
+    /// Moves the backward pass to an earlier epoch, and returns the relative covariances of the epochs that waited for
+    /// it.
     pub fn back(
         &mut self,
         at: MonoNs,
@@ -89,7 +90,7 @@ impl Later {
         });
     }
 
-    /// Ends a piece of the track, and answers all waiting epochs.
+    /// Ends a piece of the track, and returns the relative covariances of all waiting epochs.
     pub fn end(&mut self, answer: impl FnMut(Answer)) {
         self.waiting.drain(..).map(|moment| moment.answer()).for_each(answer);
         self.newest = None;

@@ -3,7 +3,8 @@
 //!
 //!     cargo test --release -p headrace_fusion --test consistency two_thousand -- --ignored --nocapture
 //!
-//! `HEADRACE_DIVES=53..54` selects seeds. With `HEADRACE_TRACE=dive.csv` the first of them is written as CSV.
+//! `HEADRACE_DIVES=53..54` selects seeds. With `HEADRACE_TRACE=dive.csv`, the dive of the first selected seed is
+//! written as CSV.
 
 #![expect(
     clippy::unwrap_used,
@@ -19,7 +20,7 @@ use std::ops::Range;
 use tally::{Tally, share};
 use world::{Fault, Log, Motion, Recipe};
 
-/// Seeds of the ordinary test, a tenth of the full set.
+/// Seeds of the test that always runs; the full set has ten times as many.
 const FEW: Range<u64> = 0..200;
 /// Seeds of dives with a velocity log, whose behaviour is one of four in turn.
 const WITH_LOG: Range<u64> = 0..80;
@@ -111,7 +112,7 @@ fn errors_are_within_5_sd_or_reported() {
         all.iter().filter(|(recipe, tally)| recipe.is_declared == is_declared && tally.silent > 0).count()
     };
     assert_eq!(silent(true), 0, "dives with an unreported error of over 5 sd");
-    // Two dives are silent: one with undeclared slack, and one with a wheel that sticks at 0.05 m/s. See
+    // Two dives have an unreported error: one with undeclared slack, and one with a wheel that sticks at 0.05 m/s. See
     // docs/why/navigation.md, "Seeded dives".
     assert!(silent(false) <= 2, "{}", silent(false));
     let within = |pick: &dyn Fn(&Recipe) -> bool| share(&of(&all, pick), |tally| [tally.within, tally.fixes]);

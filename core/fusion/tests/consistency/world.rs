@@ -240,7 +240,7 @@ fn value(sines: &Sines, t: f64) -> f64 {
     sines.iter().map(|(a, w, p)| a * math::sin(w * t + p)).sum()
 }
 
-/// A dive with the true motion that its recipe gives.
+/// A dive with the true motion that follows from its recipe.
 pub(crate) struct Dive {
     pub(crate) recipe: Recipe,
     pub(crate) profile: Profile,

@@ -1,13 +1,13 @@
-//! Profiles from their dimensions: rectangle, circle, arch, trimmed circle, and the paper's tunnel.
+//! Profiles from their dimensions: rectangle, circle, arch, trimmed circle, and the Ceran tunnel of Jorge et al. 2021.
 
 use super::profile::{Piece, Profile, ProfileError};
 use crate::math::{self, PI, TAU};
 
-/// Base of the Ceran tunnel, m (the paper's §7.3).
+/// Base of the Ceran tunnel, m (Jorge et al. 2021, §7.3).
 const CERAN_BASE_M: f64 = 10.4;
-/// Radius of the Ceran tunnel's trimmed circle, m (the paper's §7.3).
+/// Radius of the Ceran tunnel's trimmed circle, m (Jorge et al. 2021, §7.3).
 const CERAN_RADIUS_M: f64 = 6.05;
-/// Perimeter on the plant's blueprint, m (the paper's §9.2).
+/// Perimeter on the plant's blueprint, m (Jorge et al. 2021, §9.2).
 ///
 /// The base and radius above give 35.90 m instead.
 const CERAN_BLUEPRINT_PERIMETER_M: f64 = 34.17;
@@ -29,7 +29,7 @@ pub fn circle(radius_m: f64) -> Result<Profile, ProfileError> {
     Profile::new([0.0, 0.0], &[Piece::Arc { centre, sweep_rad: TAU }], centre)
 }
 
-/// Vertical walls under an arc of radius `arch_radius_m` >= width / 2, as in the paper's Fig. 2.
+/// Vertical walls under an arc of radius `arch_radius_m` >= width / 2, as in Jorge et al. 2021, Fig. 2.
 ///
 /// `height_m` is the height of the crown. The reference point is at half height.
 ///
@@ -62,7 +62,7 @@ pub fn trimmed_circle(radius_m: f64, base_m: f64) -> Result<Profile, ProfileErro
     Profile::new([0.0, 0.0], &pieces, centre)
 }
 
-/// The paper's tunnel with the dimensions that the paper states: perimeter 35.90 m.
+/// The Ceran tunnel with the dimensions in Jorge et al. 2021; its perimeter is 35.90 m.
 ///
 /// Errors: none; the dimensions are valid.
 pub fn ceran() -> Result<Profile, ProfileError> {

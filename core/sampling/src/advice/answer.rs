@@ -15,8 +15,8 @@ pub enum Reason {
     HelixPitch,
     /// A lower speed does not help, but another mode or position, or a steadier vehicle would.
     ///
-    /// The target is reached by the distance between neighbours of one turn, a strip that no head sees, or the beams'
-    /// swing.
+    /// The cause is the distance between neighbours of one turn, the width of a strip that no head sees, or the swing
+    /// of the beams.
     AngularStep,
     /// No advice is possible without position and heading.
     NoHeadingOrFix,

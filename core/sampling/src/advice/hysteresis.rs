@@ -5,7 +5,7 @@ use super::search::SPEED_MARGIN;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Less restrictive advice is displayed after this time without more restrictive advice.
+/// Less restrictive advice is displayed once no more restrictive advice has occurred for this time.
 const HOLD: DurNs = DurNs(1_000_000_000);
 /// Time for which a higher speed must last before it is displayed.
 ///
@@ -33,7 +33,7 @@ const MAYBE_BEYOND: f64 = 0.03;
 /// The most restrictive advice has the most severe reason and, for equal reasons, the lowest speed. A more severe
 /// reason appears at once; a less severe one appears after a second. A speed that is lower by 0.5 % appears at once.
 /// If all speeds are higher by 3 % for ten seconds, the lowest of them appears. Smaller changes do not appear. Advice
-/// is unfiltered until the first speed, or the first reason against any speed.
+/// is unfiltered until it first states a speed, or the reason why no speed meets the target.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
     target_m: f64,
@@ -237,7 +237,7 @@ mod tests {
     fn exceedance_appears_at_once_and_clears_at_the_target() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
-            // Above the target, but by less than `BEYOND`.
+            // T exceeds the target by less than `BEYOND`.
             vec![at(0.502); 3],
             vec![at(0.503)],
             vec![at(0.5005); 10],

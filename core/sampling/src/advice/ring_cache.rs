@@ -87,7 +87,7 @@ impl AdvisedHead {
         Ok(())
     }
 
-    /// Updates the view: the wall within the head's sector, the hidden wall, and the wall out of reach.
+    /// Updates the view: the wall within the head's sector, the hidden wall, and the wall outside the range limits.
     pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
         let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };

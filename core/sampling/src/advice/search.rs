@@ -3,7 +3,7 @@
 /// Share by which the advised speed is reduced to allow for errors of the measured speed.
 pub const SPEED_MARGIN: f64 = 0.01;
 
-/// Returns the largest speed up to `bound_mps` that meets the target, if all slower ones do.
+/// Returns the largest speed up to `bound_mps` that meets the target, provided that all lower speeds meet it.
 ///
 /// Zero if no speed meets the target.
 pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {

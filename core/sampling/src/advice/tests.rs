@@ -78,7 +78,7 @@ impl Case {
         self.advisor().advise(&self.situation, Swing::default(), self.left_s)
     }
 
-    /// T at a speed, m, by the paper's equation, with the phases of the heads at that speed.
+    /// T at a speed, m, by Eq. 16 of Jorge et al. 2021, with the phases of the heads at that speed.
     fn t_at_m(&self, advice: &Advice, speed_mps: f64) -> f64 {
         let passes = Phasing::of(&self.situation).at(speed_mps);
         let gap_s = passes.gap_s(passes.heads()).unwrap();
@@ -186,7 +186,7 @@ fn alternatives_give_speed_and_duration_and_check_the_time_left() {
     let names: Vec<_> = advice.alternatives.iter().flatten().map(|other| other.mode.as_str()).collect();
     assert_eq!(names, ["slow", "fast", "fastest"]);
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap());
-    // The present mode in phase gives the advised speed.
+    // The heads already turn in phase, so a restart in the present mode gives the advised speed.
     assert!((fast.v_max_mps - advice.v_max_mps).abs() < 1e-9);
     assert!((slow.v_max_mps - 1.0 / 10.818 * 0.99).abs() < 1e-3);
     assert!((advice.left.hours_at(fast.v_max_mps).unwrap() - 900.0 / fast.v_max_mps / 3600.0).abs() < 1e-12);

@@ -117,7 +117,7 @@ fn passes_of_a_silent_head_are_replaced_by_other_heads() {
     assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf, deaf, sound, sound]) - 3.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf]) - MOST_PASSES).abs() < 1e-12);
-    // If the other heads also lose returns, the losses of both kinds cost more than either kind alone.
+    // One head is silent and the others lose returns. Together these losses cost more than either of them alone.
     let lossy = LossRate::independent(0.1);
     let all = passes(0.1, &[deaf, lossy, lossy, lossy]);
     assert!(all > 2.05 && all > passes(0.1, &[lossy; 4]), "{all}");
@@ -133,7 +133,7 @@ fn required_passes_grow_continuously_with_losses() {
         for k in 0..4980 {
             let [mut low, mut high] = [k, k + 1].map(|k| 0.002 + 2e-4 * f64::from(k));
             assert!(at(high) >= at(low) - 1e-9, "steps of {t_y_m} m, {high}: {} to {}", at(low), at(high));
-            // The number rises steeply where a run becomes as wide as the target.
+            // The number of passes rises steeply where a run of lost pings becomes as wide as the target.
             for _ in 0..40 {
                 let middle = f64::midpoint(low, high);
                 if at(middle) - at(low) > at(high) - at(middle) { high = middle } else { low = middle }
@@ -153,7 +153,7 @@ fn no_extra_passes_without_losses_or_without_a_speed() {
 
 /// Chance losses often make small holes and never large ones.
 ///
-/// Without chance losses, no hole is by chance.
+/// Without chance losses, no hole counts as caused by chance.
 #[test]
 fn hole_is_by_chance_if_enough_losses_can_coincide() {
     let hole = |hole_m: f64, rate: LossRate| sampled(0.1).is_by_chance(hole_m, 0.3, rate);
@@ -163,7 +163,7 @@ fn hole_is_by_chance_if_enough_losses_can_coincide() {
     let [never, runs] = [LossRate::default(), LossRate { share: 0.58, after_lost: 0.98 }];
     assert!(!hole(0.55, never));
     assert!(hole(2.0, runs), "most of each turn is lost in long runs");
-    // A hole that is by chance remains so with higher losses, and smaller holes are by chance as well.
+    // A hole that counts as caused by chance still counts so with higher losses, and so do smaller holes.
     for share in 1..9 {
         let rate = LossRate::independent(f64::from(share) / 10.0);
         let largest = |from: i32| (from..60).rev().find(|n| hole(f64::from(*n) / 20.0, rate)).unwrap_or(0);

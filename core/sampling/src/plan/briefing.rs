@@ -25,7 +25,7 @@ pub struct Briefing {
     pub starts: Vec<Start>,
     /// Spacing rule for heads apart along the hull that start at equal angles.
     pub hull_rules: Vec<HullAdvice>,
-    /// Pairs of heads that can hear each other.
+    /// Pairs of heads that can receive each other's pings.
     pub exposures: Vec<Heard>,
 }
 
@@ -87,7 +87,7 @@ pub struct HullAdvice {
     pub apart_m: f64,
 }
 
-/// Time in which two heads can hear each other.
+/// Time in which two heads can receive each other's pings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Heard {
     /// The two heads.

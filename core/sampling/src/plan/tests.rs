@@ -213,7 +213,7 @@ fn each_margin_lowers_the_speed_down_to_the_largest_planned_speed() {
     }
 }
 
-/// The reach is that of the shortest range of any head; the ping period follows from the turn.
+/// The stated range is the smallest of the heads' maximum ranges. The ping period follows from the turn period.
 #[test]
 fn plan_states_its_reach_and_ping_period() {
     let mut shorter = ideal(2);

@@ -276,7 +276,8 @@ fn overlapping_hidden_arcs_across_the_seam_form_one_strip() {
 
 #[test]
 fn full_capacity_hides_more_wall_and_never_less() {
-    // Slots all around the profile are out of reach. One of the two views has too little capacity for the slots.
+    // Slots all around the profile are outside the range limits. One of the two views has too little capacity for the
+    // slots.
     let points: Vec<[f64; 2]> = (0..240)
         .map(|k| {
             let (sine, cosine) = math::sin_cos(math::TAU * (f64::from(k) + 0.3) / 240.0);

@@ -11,14 +11,14 @@ use headrace_geometry::snapshot::stateful;
 pub struct View {
     /// Sector of the head; `None` for the whole perimeter.
     pub sector: Option<Sector>,
-    /// Arcs of the wall that the vehicle hides from the head, or that are out of the head's reach.
+    /// Arcs of the wall that the vehicle hides from the head, or that are outside the head's range limits.
     pub hidden: Vec<Arc>,
 }
 
 stateful!(View { state: sector; lists: hidden; });
 
 impl View {
-    /// Hides the parts of a ring nearer or farther than the head's reach.
+    /// Hides the parts of a ring that are outside the head's range limits.
     ///
     /// Without capacity for another arc, the function extends the last arc over the visible part in between. Hiding
     /// too much wall is the safe error.

@@ -66,7 +66,7 @@ fn is_one_frame<C: Codec>(codec: &mut C, bytes: &[u8]) -> bool {
     values.len() == 1 && counts.bad_frames == 0 && counts.skipped_bytes == 0
 }
 
-/// Sets the two bytes from `at` on so that `bytes` passes as one frame; returns `false` if no values do.
+/// Sets the two bytes from `at` on so that `bytes` passes as one frame; returns `false` if this is impossible.
 fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) -> bool {
     let Some(before) = bytes.get(at..at + 2).map(<[u8]>::to_vec) else { return false };
     if bytes.len() > MOST_MATCHED {

@@ -17,8 +17,8 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Rate at which the usual delay rises while stamps are later than usual, per second. Clocks drift apart more
 /// slowly.
 ///
-/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` as fast. It so settles at the delay that
-/// one stamp in ten undercuts. A garbled stamp has no larger effect than any other.
+/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` as fast. It therefore converges to a delay
+/// that one stamp in ten is below. A garbled stamp has no larger effect than any other.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
 /// Maximum time between stamps that counts in a change of the usual delay, s.
@@ -66,7 +66,8 @@ struct UsualDelay {
 }
 
 impl SampleTimes {
-    /// Creates it for a clock of `bits` bits (1 to 64) with ticks of length `tick`, as in [`DeviceClock::new`].
+    /// Creates the correction for a clock of `bits` bits (1 to 64) with ticks of length `tick`, as in
+    /// [`DeviceClock::new`].
     pub fn new(bits: u32, tick: DurNs) -> Self {
         Self {
             clock: DeviceClock::new(bits, tick),

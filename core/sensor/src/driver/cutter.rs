@@ -72,7 +72,8 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.hand_on(&found, take);
     }
 
-    /// Returns when to push zero bytes, so that an incomplete frame no longer holds other frames back.
+    /// Returns the time of the next push of an empty slice, after which an incomplete frame no longer holds back
+    /// others.
     ///
     /// `None` if nothing is pending, or if the silence has been handled.
     pub fn settles(&self) -> Option<MonoNs> {

@@ -1,4 +1,4 @@
-//! Drivers of devices that transmit without being asked.
+//! Drivers of devices that transmit without requests.
 
 use super::{Cutter, DeviceHealth, Driver, Wire};
 use crate::codec::Framing;

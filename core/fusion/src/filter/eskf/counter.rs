@@ -81,7 +81,7 @@ impl Eskf {
                 // dispute.
                 add_to(errors, CREEP, lost_m);
                 add_to(&mut self.doubts, CREEP, lost_m * lost_m);
-                // Either the counter has lost this length, or the estimated motion was wrong meanwhile.
+                // Either the counter has lost this length, or the estimated motion was wrong during the dispute.
                 self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
                 self.ties += 1;
             }

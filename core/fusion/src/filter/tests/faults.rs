@@ -117,7 +117,7 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
         before = running.factors;
     }
     assert!(matches!(nav.fix(at(FAULT_S + 15.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
-    // The estimated position does not drift away meanwhile.
+    // The estimated position does not drift away during the fault.
     assert!((nav.running().unwrap().state.position - rig.unit(0.0)).norm() < 1.0);
 }
 
@@ -277,8 +277,8 @@ fn ranged(reading: &Reading, share: f64) -> Reading {
 
 #[test]
 fn filter_recovers_from_a_plausible_jump_within_60_s() {
-    // A knock or a faulty unit: no single sensor shows the fault. The fix is wrong until the other sensors have
-    // corrected it.
+    // The cause is a knock or a faulty unit, and no single sensor shows the fault. The fix is wrong until the other
+    // sensors have corrected it.
     let forces = [(5.0, 0.2), (5.0, 1.0), (1.0, 5.0), (0.2, 20.0)].map(|jump| (jump, false));
     let rates = [(5.0, 0.02), (5.0, 0.2), (1.0, 1.0), (0.1, 5.0), (0.01, 20.0)].map(|jump| (jump, true));
     let jumps = forces.into_iter().chain(rates).flat_map(|jump| (1..=6).map(move |seed| (jump, seed)));

@@ -133,7 +133,7 @@ fn repeated_inertial_sample_counts_once() {
     let rig = Rig::new(cruise, 1);
     let events = rig.events(0.0, 20.0);
     let right = outcome(&rig, &events);
-    // The second copy has the same times, times a nanosecond later, or a later receive time.
+    // The second copy has the same times, both times a nanosecond later, or only a later receive time.
     for (later, delay) in [(0, 0), (1, 1), (0, 90_000_000)] {
         let mut again = events.clone();
         let inertial = events.iter().filter(|event| !matches!(event.reading, Reading::Attitude(_)));

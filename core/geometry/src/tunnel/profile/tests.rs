@@ -58,7 +58,7 @@ proptest! {
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
     ) {
-        // Only a few of many points stand out, so the hull's edges are long.
+        // A few of many points are much farther out than the rest, so the edges of the convex hull are long.
         let radii: Vec<f64> = match level {
             Some(of_32) => radii.iter().enumerate().map(|(k, r)| if k % 32 == of_32 { *r } else { 1.8 }).collect(),
             None => radii,

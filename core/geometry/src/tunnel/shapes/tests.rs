@@ -23,7 +23,7 @@ fn all() -> Vec<(&'static str, Profile)> {
     ]
 }
 
-/// The expected values are derived from the paper's figures.
+/// The expected values are derived from the figures of Jorge et al. 2021.
 #[test]
 fn ceran_has_the_dimensions_of_the_errata() {
     let ceran = ceran().unwrap();
