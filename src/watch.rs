@@ -138,7 +138,7 @@ impl Watch {
         }
     }
 
-    /// Takes a tick that belongs to a jump, without showing it.
+    /// Processes a tick that belongs to a jump, without showing it.
     pub(crate) fn skipped(&mut self, dive: &Loop) {
         self.followers.iter_mut().for_each(|follower| follower.skipped(dive));
     }

@@ -80,7 +80,8 @@ struct Tile {
     half_arc_m: f64,
     /// Sample nearest to the tile's centre, relative to the centre, m.
     ///
-    /// In searches for any circle, this is a nearby sample, from the start of the section.
+    /// The searches for an empty circle of given size use it differently. They store the chainage and arc
+    /// length of any nearby sample, with the chainage from the start of the section.
     owner: (f64, f64),
     /// Upper bound of f in the tile, m.
     bound_m: f64,
@@ -104,7 +105,8 @@ struct Beyond {
 
 /// Search result near the centre of a tile.
 enum Near {
-    /// A sample is so near that it is within the radius of every point of the tile.
+    /// Every point of the tile is within the radius of one sample, so no empty circle has its centre in the
+    /// tile.
     Settled,
     /// The nearest sample, or an equally near one.
     Sample(Nearest),
@@ -113,7 +115,7 @@ enum Near {
 }
 
 impl Near {
-    /// Returns the sample and its distance, m; `None` if the tile is settled.
+    /// Returns the sample and its distance, m; `None` for [`Near::Settled`].
     fn unsettled(self) -> Option<(Option<Nearest>, f64)> {
         match self {
             Self::Settled => None,
@@ -144,7 +146,7 @@ impl Tile {
 
     /// Searches for a sample near the tile's centre.
     ///
-    /// If the owner (chainage and arc length) is near enough to settle the tile, the function does not search.
+    /// If the known sample `owner` is within the radius of the whole tile, the function does not search.
     /// Otherwise, it returns any sample that is near enough, or the nearest one.
     fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
         // The margins are larger than the rounding errors of the distances.
@@ -279,7 +281,7 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile until its bound can't exceed the best point, which may lie in the tile.
+    /// Divides a tile among samples until no point of it can be farther from all samples than the best point.
     ///
     /// Returns false if the tile must be halved first.
     fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {

@@ -114,7 +114,8 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 impl Relief {
     /// Whether earlier returns near this place have the same deviation from the design.
     ///
-    /// An earlier wall return counts within the reach along the tunnel, a doubtful one within half of all limits.
+    /// The limits are the reach along the tunnel and the tolerance. An earlier wall return must be within both
+    /// limits, a doubtful one within half of each.
     pub(super) fn supports(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
         let (slab, bin) = place(placed, limits);
         (slab - 2..=slab + 2).any(|slab| {

@@ -320,7 +320,8 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Returns the evidence of a section, or that of a flagged neighbour if its cause is unknown.
+    /// Returns the evidence of a section. If its cause is unknown, the causes of a flagged neighbour replace
+    /// it.
     ///
     /// The edge of a stretch thus has the causes of the stretch.
     fn as_beside(&self, index: i64, evidence: Evidence) -> Evidence {

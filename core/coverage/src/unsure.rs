@@ -68,9 +68,8 @@ pub struct Stretch {
     pub from: i64,
     /// Index after the last section.
     pub to: i64,
-    /// The stretch's unsure sections in two groups.
-    ///
-    /// In the first group, the hole matters more; in the second, the error does.
+    /// The stretch's unsure sections in two groups: those in which the hole matters more, and those in which
+    /// its error does.
     of: [Largest; 2],
 }
 

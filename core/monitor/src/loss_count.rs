@@ -60,9 +60,9 @@ impl Angles {
 
 /// Losses of one head; part of the loop's state.
 ///
-/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. Some
-/// wall is silent turn after turn, such as a side tunnel or wall at a grazing angle. Its returns are not lost
-/// by chance, neither at its beginning nor at its end.
+/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side
+/// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such returns are not lost by
+/// chance, neither the first nor the last of them.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
     /// Whether the wall was detected at each angle in the last turn, and in the turn before that.

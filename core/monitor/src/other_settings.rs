@@ -32,8 +32,8 @@ impl HeadSpecification {
     pub fn settings(&self, name: &str, profile: &Profile, target_m: f64) -> HeadSettings {
         let [_, own_m] = self.spec.range_m;
         let range_m = self.reaching.as_ref().map(|(range_m, _)| *range_m);
-        // The live advice uses the same number of rays. Both name modes on the same screen, so the modes must
-        // agree.
+        // The live advice uses the same number of rays. Its mode and this mode appear on the same screen, so
+        // they must agree.
         let rays = Looks::default().ring;
         let ring = self.ring_in_the_middle(profile, rays).unwrap_or_default();
         let finer = self.finer(target_m, |step_rad| ring.largest_step_m(Ring::stride(step_rad, rays)));

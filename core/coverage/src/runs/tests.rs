@@ -29,7 +29,7 @@ impl Rig {
 
     fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        // A speed helps for all but the largest holes.
+        // No speed helps against holes of a metre or more.
         let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
         let failing = causes.map(|causes| Failing { causes, again_mps });
         (self.failing[slot], self.holes[slot]) = (failing, diameter_m);

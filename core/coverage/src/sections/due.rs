@@ -14,7 +14,7 @@ use headrace_geometry::math;
 /// This distance bounds the delay of a flag.
 const LOOK_M: f64 = 0.125;
 
-/// Limits that require a check at the next movement, because every finite reach is beyond them.
+/// Limits that every finite reach has passed, so that the next movement causes a check.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Sections {
@@ -27,7 +27,8 @@ impl Sections {
 
     /// Sets the next places to check.
     ///
-    /// Wall behind the vehicle is left in steps of a part of a section. So is wall ahead if the vehicle goes back.
+    /// A check is due each time the heads have left a further part of a section: behind the vehicle, or ahead of a
+    /// vehicle that goes back.
     fn look_again(&mut self, to_come: Option<Reach>) {
         let Some(Reach { from_m, to_m }) = to_come else { return };
         let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
@@ -96,7 +97,7 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for sections of the still zone.
+    /// Calls `ask` for sections in reach of a vehicle that is nearly stationary.
     ///
     /// Without this call, these sections would get no verdict while the vehicle is stationary. A section is due if it
     /// may certainly fail although its hole may still get samples, or if it is flagged and has new samples since it

@@ -34,7 +34,8 @@ impl Place {
     }
 }
 
-/// A brick that a search has reached on one side.
+/// State of a pass search on one side of the query point, with the brick (a group of cell rows) that it has
+/// reached.
 #[derive(Debug, Clone, Copy, Default)]
 struct Side {
     brick: Option<u32>,
