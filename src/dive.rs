@@ -56,7 +56,7 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// Whether the loop has been told that a recording fails.
+    /// Whether the loop has been informed that a recording fails.
     fails: bool,
 }
 

@@ -30,7 +30,7 @@ pub struct Evidence {
     pub with_losses_mps: f64,
     /// Longest time between passes, seconds.
     pub pass_gap_s: f64,
-    /// Longest time between passes if these had been evenly spread, seconds.
+    /// Longest time between passes if the passes had been evenly spread, seconds.
     pub even_pass_gap_s: f64,
     /// Longest time between evenly spread passes if all heads had been turning, seconds.
     pub all_pass_gap_s: f64,

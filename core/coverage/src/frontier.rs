@@ -143,7 +143,7 @@ pub struct Outlook {
     pub to_come: Option<Reach>,
     /// Stretch behind the place where the vehicle began or turned back.
     ///
-    /// Not all heads have been in this stretch, and on the present course they will not be.
+    /// Not all heads have been in this stretch. On the present course, the other heads will not reach it.
     pub not_passed: Option<Reach>,
     /// Stretch that all heads, pinging or not, have passed; `None` before.
     pub through: Option<Reach>,

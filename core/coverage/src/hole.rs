@@ -37,7 +37,7 @@ pub const FARTHEST_M: f64 = 12.0;
 const NO_FINER_M: f64 = 1e-10;
 /// Upper limit of the rounding error of a distance, m.
 const ROUNDING_M: f64 = 1e-9;
-/// Owner of a tile without a known sample.
+/// Value of `owner` for a tile without a known sample.
 const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 /// Rounding tolerance with which a corner's bound counts as proven, m.
 const PROVEN_M: f64 = 1e-11;
@@ -160,7 +160,7 @@ impl Tile {
         window.near_enough(self.x_m, self.arc_m, within_m, enough_m).map_or(Near::Nothing, Near::Sample)
     }
 
-    /// Returns the halves of a tile, owned by the nearest sample if one is within reach.
+    /// Returns the halves of a tile. Their `owner` becomes the nearest sample, if one is within reach.
     fn halves_of(mut self, nearest: Option<&Nearest>, perimeter_m: f64) -> [Self; 2] {
         if let Some(found) = nearest {
             self.owner = (found.x_m, found.arc_m + found.turns * perimeter_m);
@@ -281,7 +281,8 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile among samples until no point of it can be farther from all samples than the best point.
+    /// Divides a tile among samples until no point of it can be clearly farther from all samples than the
+    /// best point.
     ///
     /// Returns false if the tile must be halved first.
     fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {

@@ -95,7 +95,7 @@ pub struct Driven {
     ///
     /// Heads apart along the hull are then out of phase.
     pub is_uneven: bool,
-    /// Whether heads were silent, or heard no wall; the speeds are those for all heads.
+    /// Whether heads were silent or detected no wall. The speeds are nevertheless those for all heads.
     pub is_short: bool,
 }
 

@@ -300,7 +300,7 @@ impl LiveState {
 
     /// Share of lost returns; `None` unless compensating for the losses costs at least a fifth of the speed.
     pub fn lost_share(&self) -> Option<f64> {
-        /// Share of the speed that remains after a loss of a fifth.
+        /// Share of the speed that remains if losses cost a fifth of it.
         const LEFT: f64 = 0.8;
         let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
         let margins = advice.margins?;

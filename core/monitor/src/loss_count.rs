@@ -14,7 +14,8 @@ const WORDS: usize = BINS / 64;
 const WINDOW: u32 = 4096;
 /// Minimum number of pings for a share. With fewer, a single loss would count too much.
 const LEAST: u32 = 100;
-/// Weight of the overall share in the share after a lost ping, in pings. It matters while lost pings are few.
+/// Weight of the overall share of losses in the share of losses after a lost ping, in pings. It matters while
+/// lost pings are few.
 const USUAL: f64 = 50.0;
 /// Share of lost pings above which a head is nearly deaf. Hardly any angle then gives a return in two
 /// successive turns.

@@ -18,7 +18,7 @@ use headrace_vehicle::Mission;
 
 /// Longest range setting tried, m. Settings are tried in whole metres.
 const LONGEST_M: u32 = 200;
-/// Maximum difference between equal steps, radians.
+/// Steps that differ by at most this angle count as equal, radians.
 const SAME_STEP_RAD: f64 = 1e-6;
 
 impl HeadSpecification {

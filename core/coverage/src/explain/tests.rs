@@ -324,7 +324,7 @@ fn removed_speed_cause_gives_the_largest_speed_that_fits() {
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
 }
 
-/// At 0.1 m/s, heads pass as far apart after 4 s as after 2 s at the planned 0.2 m/s.
+/// Passes 4 s apart at 0.1 m/s have the same distance as passes 2 s apart at the planned 0.2 m/s.
 ///
 /// The planned speed helps only if distances shrink by more than the factor `HELPS`.
 #[test]

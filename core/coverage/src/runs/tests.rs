@@ -113,7 +113,7 @@ fn runs_grow_and_merge_and_are_cleared() {
     let first = *rig.runs.get(RunId(0)).unwrap();
     assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
     assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
-    // On either side, the last section that would still join the run, and the first that would not.
+    // Sections 7 and 19 are the farthest that would still join the run. Sections 6 and 20 would not join it.
     assert_eq!([6, 7, 19, 20].map(|section| rig.runs.is_beyond(&first, section)), [true, false, false, true]);
     for section in [10, 11, 14, 16] {
         rig.say(section, None, 0.2);

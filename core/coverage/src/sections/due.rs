@@ -1,7 +1,7 @@
 //! Decides which sections are due for judging.
 //!
-//! A section is due if the heads have left it, or if a part of it may certainly fail. At the end of a dive, all
-//! sections that aren't settled are due.
+//! A section is due if the heads have left it, or if a part of it may certainly fail. At the end of a dive, a
+//! section is due if its verdict may still change.
 
 use super::super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::super::hole::{FARTHEST_M, Needed};
@@ -62,7 +62,7 @@ impl Sections {
             }
         }
         let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
-        // The sections at the zone's ends may be left in part.
+        // The heads may have left only a part of the sections at the zone's ends.
         let behind = moved.left_behind.end - far..moved.left_behind.end + 1;
         let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
         for range in [behind, ahead] {
@@ -166,7 +166,8 @@ mod tests {
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
-    /// Partly left sections are checked every few centimetres of travel, behind and ahead.
+    /// Sections that the heads have left in part are checked every few centimetres of travel, behind and
+    /// ahead.
     #[test]
     fn next_check_is_due_after_a_few_centimetres_of_travel() {
         let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);

@@ -102,7 +102,7 @@ pub(crate) struct MissingSampleFinder {
     forgot: bool,
     /// Heads that have stalled and have not been in phase since.
     pub(super) stalled: HeadSet,
-    /// Deaf heads, as of the last update.
+    /// Deaf heads as of the last update: heads that turn and ping without detecting the wall.
     deaf: HeadSet,
 }
 
@@ -199,7 +199,7 @@ pub(super) fn number_of(head: usize) -> u8 {
     u8::try_from(head).unwrap_or(u8::MAX)
 }
 
-/// Records the deaf heads. Their losses in the last turn are not random.
+/// Records the heads that ping without detecting the wall. Their losses in the last turn are not random.
 fn note_deaf(lacking: &mut MissingSampleFinder, deaf: HeadSet, coverage: &mut Coverage) {
     let before = core::mem::replace(&mut lacking.deaf, deaf);
     for head in deaf.iter().filter(|head| !before.has(*head)) {
