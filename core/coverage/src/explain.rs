@@ -36,18 +36,15 @@ const OVER_PLAN: f64 = 1.15;
 ///
 /// The speed is then known from the inertial unit alone.
 const OVER_LOST: f64 = 1.4;
-/// Speed counts as a factor if it exceeds this multiple of the larger of two speeds: the planned one and the one that
-/// fits.
+/// Speed counts as a factor if it exceeds both the planned speed and the fitting speed by this ratio.
 ///
 /// The ratio is just above the measurement error of the speed.
 const OVER_ALL: f64 = 1.03;
-/// Swing counts as a factor if the distance between passes without swing is below this share of that with
-/// swing.
+/// Swing counts as a factor if, without it, the distance between passes shrinks below this share.
 ///
 /// Even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
-/// The angular step counts as a factor if, from the tunnel's centre, a step along the wall exceeds this share
-/// of the target.
+/// Share of the target above which a step along the wall, seen from the tunnel's centre, is a factor.
 const COARSE: f64 = 0.75;
 
 /// Determines the causes of a section's hole from the sections within T of this section.

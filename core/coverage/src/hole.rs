@@ -105,8 +105,7 @@ struct Beyond {
 
 /// Search result near the centre of a tile.
 enum Near {
-    /// Every point of the tile is within the radius of one sample, so no empty circle has its centre in the
-    /// tile.
+    /// No empty circle has its centre in the tile: one sample is within the radius of all its points.
     Settled,
     /// The nearest sample, or an equally near one.
     Sample(Nearest),
@@ -281,8 +280,7 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile among samples until no point of it can be clearly farther from all samples than the
-    /// best point.
+    /// Divides a tile among samples until none of its points can clearly exceed the best point's distance.
     ///
     /// Returns false if the tile must be halved first.
     fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {

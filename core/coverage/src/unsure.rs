@@ -68,8 +68,10 @@ pub struct Stretch {
     pub from: i64,
     /// Index after the last section.
     pub to: i64,
-    /// The stretch's unsure sections in two groups: those in which the hole matters more, and those in which
-    /// its error does.
+    /// The stretch's unsure sections in two groups.
+    ///
+    /// In sections of the first group, the hole matters more than its error. In those of the second, the
+    /// error does.
     of: [Largest; 2],
 }
 

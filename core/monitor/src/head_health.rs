@@ -10,8 +10,8 @@ use headrace_geometry::math::{self, TAU};
 const DEAF_RAD: f64 = TAU;
 /// Averaging angle for the share of returns that are off the design, radians.
 const ELSEWHERE_RAD: f64 = TAU / 2.0;
-/// A head is stuck if all its returns over this angle, radians, have the same range, while the deviation from
-/// the design varies by this much, m.
+/// A head is stuck if it returns a constant range over this angle, radians, while the deviation from the
+/// design varies by this much, m.
 const STUCK_RAD: f64 = TAU / 2.0;
 const STUCK_M: f64 = 0.3;
 /// Share of returns off the design above which a head is deaf, and limit for the share of another head.

@@ -34,8 +34,9 @@ impl Place {
     }
 }
 
-/// State of a pass search on one side of the query point, with the brick (a group of cell rows) that it has
-/// reached.
+/// State of a pass search on one side of the query point.
+///
+/// The search has reached this brick, a group of cell rows.
 #[derive(Debug, Clone, Copy, Default)]
 struct Side {
     brick: Option<u32>,
