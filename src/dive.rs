@@ -56,7 +56,7 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// Whether the loop has been told that a recording fails.
+    /// Whether the loop has been informed that a recording fails.
     fails: bool,
 }
 
@@ -420,7 +420,8 @@ impl Dive {
         // This tick records the last judgements.
         let now = self.armed.now();
         self.armed.tick(now);
-        // The samples are no longer needed, and the report of a long dive takes as much memory.
+        // The samples are no longer needed. They are freed now, because the report of a long dive takes as
+        // much memory.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         let recordings = core::mem::take(&mut self.recordings);

@@ -118,7 +118,8 @@ impl Failure {
             | Self::Routing(_)
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
             Self::Log(error) if is_wrong_file(error) => USAGE,
-            // The vehicle file is wrong, except if the order of systems is: it doesn't come from the file.
+            // The vehicle file is at fault, except if the schedule can't be built: the schedule doesn't come
+            // from the file.
             Self::Plugin(error) if !matches!(error, PluginError::Schedule { .. }) => USAGE,
             _ => FAILED,
         }

@@ -51,7 +51,8 @@ impl Requests {
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     on(SIGHUP, &flag)?;
-    // Without it, a write beyond the limit of file sizes would end a recording from a log or a simulation.
+    // Without a handler of this signal, a write beyond the limit of file sizes would end a recording from a
+    // log or a simulation.
     on(SIGXFSZ, &Arc::default())?;
     Ok(flag)
 }

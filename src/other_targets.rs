@@ -16,8 +16,8 @@ use crate::phase::Phase;
 use crate::smooth;
 use crate::watch::Watch;
 
-/// Judges the dive for each combination of the requested targets and section lengths. Empty if there is only
-/// one.
+/// Judges the dive for each combination of the requested targets and section lengths. Returns nothing if
+/// there is only one combination.
 ///
 /// Counted visits and the times of flags depend on the target. Each combination is therefore replayed, except
 /// the one that was played already.

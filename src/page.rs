@@ -338,7 +338,7 @@ impl Served {
 
     /// Lets the page control a replay.
     ///
-    /// With `stays` the replay remains at the end of the log until `interrupted`. Without it, the returned
+    /// With `stays` the replay remains at the end of the log until `interrupted`. Otherwise the returned
     /// function ends the control.
     pub(crate) fn direct(
         &self,

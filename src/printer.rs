@@ -21,7 +21,7 @@ enum Message {
 pub(crate) struct Printer {
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
-    /// Disconnected when the thread has written all lines.
+    /// Channel that is disconnected when the thread has written all lines.
     done: Receiver<()>,
     /// Whether lines without room are dropped, instead of waiting.
     lossy: bool,

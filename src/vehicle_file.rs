@@ -80,7 +80,7 @@ fn parse(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConfig, Fail
     Ok(vehicle)
 }
 
-/// Logs that a vehicle file has been parsed.
+/// Writes a log message about a parsed vehicle file.
 pub(crate) fn log(name: &str, vehicle: &VehicleConfig) {
     tracing::info!(
         file = name,

@@ -23,8 +23,8 @@ use crate::terminal;
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
 /// Interval of state lines that are overwritten, and of states in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
-/// Minimum time after the last state line before a changed lamp gives a new line. It applies if lines can't
-/// be overwritten.
+/// Minimum time after the last state line before a changed lamp colour gives a new line. It applies if lines
+/// can't be overwritten.
 const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 
 /// Display of a dive.
@@ -138,7 +138,7 @@ impl Watch {
         }
     }
 
-    /// Takes a tick that belongs to a jump, without showing it.
+    /// Processes a tick that belongs to a jump, without showing it.
     pub(crate) fn skipped(&mut self, dive: &Loop) {
         self.followers.iter_mut().for_each(|follower| follower.skipped(dive));
     }

@@ -56,7 +56,7 @@ pub(crate) enum NotEstimated {
         /// Sector required, degrees.
         least_deg: f64,
     },
-    /// The section looks the same whatever the head's angle about its axis.
+    /// The cross-section looks the same at every angle of the head about its axis.
     #[error(
         "the section looks the same at every angle of the head about its axis (a circle doesn't determine \
          roll): the angle would have a standard deviation of {sd_deg:.1} degrees"

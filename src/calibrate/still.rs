@@ -13,7 +13,7 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Level, Reading};
 
-/// Interval for which medians are formed. Noise and outliers thus don't count as motion.
+/// Length of a bin. Each bin gives one median, so noise and outliers don't count as motion.
 const BIN: DurNs = DurNs(1_000_000_000);
 /// Minimum length of a time at rest, and the longest part of it that is used, in bins. A longer part adds no
 /// information.

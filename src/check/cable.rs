@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 /// Accuracy of the cable's chainage, for a vehicle with a counter and the filter.
 pub(super) struct Cable {
-    /// Smallest change of the chainage, m; `None` if each reading states its own.
+    /// Smallest change of the chainage, m; `None` if each reading has its own step.
     step_m: Option<f64>,
     /// Standard deviation of the slack, m, and its time constant, s.
     slack: [f64; 2],

@@ -116,7 +116,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     place(one) == place(other) || number(one).is_some_and(|one| number(other) == Some(one))
 }
 
-/// File to which a path leads, even if it doesn't exist yet.
+/// File to which a path leads. The file may not exist yet.
 fn place(path: &Path) -> PathBuf {
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());

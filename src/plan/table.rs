@@ -183,7 +183,7 @@ fn best_words(best: &Answer) -> String {
 
 /// Text on the speed that each margin costs.
 fn margin_words(mode: &str, margins: &Margins) -> String {
-    /// Price of a margin that the printed speeds would not show, m/s.
+    /// Cost of a margin, m/s, below which it isn't printed, because the rounded speeds would not show it.
     const NOTHING_MPS: f64 = 5e-4;
     let mut words = vec![format!("{mode}: {:.3} m/s from the geometry alone", margins.geometry_mps)];
     let after = margins.speeds_mps().into_iter().skip(1);

@@ -323,7 +323,7 @@ impl Page {
     }
 }
 
-/// Replaces the non-ASCII characters of external text. A single plus must not stand for plus or minus.
+/// Replaces the non-ASCII characters of external text. A plus-minus sign becomes a tilde.
 fn in_ascii(cell: &mut Cell) {
     if !cell.symbol().is_ascii() {
         let plain = if cell.symbol() == "±" { "~" } else { "?" };

@@ -66,7 +66,7 @@ pub(crate) struct Tui {
     wanted: Arc<AtomicBool>,
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
-    /// Disconnected when the terminal has been restored.
+    /// Channel that is disconnected when the terminal has been restored.
     done: Receiver<()>,
     is_live: bool,
 }

@@ -54,11 +54,11 @@ pub(super) fn speed(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     }
     rows.line(Line::from(spans));
     let mut parts: Vec<&str> = Vec::new();
-    // Lost returns are part of the status already.
+    // The status line already has the share of lost returns.
     if is_known && !shot.reason.is_empty() && state.lost_share().is_none() {
         parts.push(&shot.reason);
     }
-    // The banner shows the first parts already.
+    // The banner already has the first parts of the status.
     let shown = if shot.status.action.is_empty() { 2 } else { 1 };
     parts.extend(shot.status.what.iter().skip(shown).map(String::as_str));
     rows.text(&one_line(&format!("WHY    {}", fitted(&parts, columns_after_label(rows)))), Style::default());
@@ -68,7 +68,7 @@ fn columns_after_label(rows: &Rows<'_>) -> usize {
     usize::from(rows.width()).saturating_sub(LABEL + 1)
 }
 
-/// The first parts, as many as fit in full.
+/// Joins the parts, from the first on, as long as they fit in full.
 fn fitted(parts: &[&str], columns: usize) -> String {
     let mut text = String::new();
     for part in parts {
@@ -135,7 +135,7 @@ fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let mut text = format!("{:.2} m:", metres.way_m());
     for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
         let part = format!(" {part_m:.2} {what},");
-        // The dots need room, too.
+        // Room for the dots is kept.
         if text.len() + part.len() + 3 > columns {
             text += " ..";
             break;

@@ -203,7 +203,7 @@ mod tests {
         let mut master = File::from(master);
         let reading = thread::spawn(move || {
             let (mut all, mut bytes) = (Vec::new(), [0; 4096]);
-            // When all handles of a pseudo-terminal are closed, reading returns an error at its end.
+            // Once all handles of a pseudo-terminal's other end are closed, reading returns an error.
             while let Ok(count @ 1..) = master.read(&mut bytes) {
                 all.extend_from_slice(&bytes[..count]);
             }

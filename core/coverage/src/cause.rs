@@ -10,13 +10,13 @@ use super::passage::Loss;
 pub enum Cause {
     /// The distance between passes was too large at the speed driven.
     TooFast,
-    /// The angular step alone leaves holes of this size. Lower speed does not help.
+    /// The angular step alone leaves holes that are too large. Lower speed does not help.
     AngularStep,
     /// The wall was farther than the heads' range setting.
     OutOfRange,
     /// The vehicle was off-centre, or it turned and its beams swung along the tunnel.
     OffAxis,
-    /// The heads' passes were unevenly spread; scheduled passes would have met the target.
+    /// The heads' passes were unevenly spread. At the scheduled angles, they would have met the target.
     Phase,
     /// The hole extends beyond the stretch that all live heads have swept.
     NotPassed,
@@ -71,7 +71,7 @@ impl Cause {
         }
     }
 
-    /// Cause of a ping without a sample, for this reason.
+    /// Cause that corresponds to the reason for a missing sample.
     pub fn of_loss(loss: Loss) -> Self {
         match loss {
             Loss::Missing => Self::MissingReturns,

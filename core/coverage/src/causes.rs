@@ -68,7 +68,7 @@ impl Causes {
         self.0
     }
 
-    /// Set of the causes with these bits. Unknown bits are ignored.
+    /// Set of the causes whose bits are set. Unknown bits are ignored.
     pub fn from_bits(bits: u16) -> Self {
         Cause::ALL.into_iter().filter(|cause| bits & (1 << *cause as u16) != 0).collect()
     }

@@ -15,9 +15,8 @@ pub struct Deviation {
     inmost_m: f64,
     /// Largest outward deviation, m; never below zero.
     outmost_m: f64,
-    /// Area swept from the reference point between neighbouring samples, and the design's area, m2.
-    ///
-    /// Both areas cover the same angles of the sweeps.
+    /// Area between the reference point and the samples of the sweeps, and the design's area over the same
+    /// angles, m2.
     swept_m2: f64,
     design_m2: f64,
 }
@@ -64,7 +63,7 @@ impl Deviation {
         (self.design_m2 > 0.0).then(|| self.swept_m2 / self.design_m2)
     }
 
-    /// Whether most samples exceed the contradiction limit, and thus their median does.
+    /// Whether most samples deviate from the design by more than the contradiction limit.
     ///
     /// In that case, either the profile or the position is wrong.
     pub fn contradicts(&self) -> bool {

@@ -9,8 +9,8 @@ use headrace_sampling::head::HeadSet;
 
 /// Causes of a fail, and the figures behind them.
 ///
-/// The driving figures are from the moment with the largest T as driven, among the sections within T. Counts are sums
-/// over the same sections.
+/// The counts are sums over the sections within the distance T of the hole, where T is the target. The driving
+/// figures come from the same sections, at the moment with the largest distance between passes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Main cause: the first cause in `causes`.
@@ -26,11 +26,11 @@ pub struct Evidence {
     pub fits_mps: f64,
     /// `fits_mps` reduced for lost returns, m/s; never above `fits_mps`.
     ///
-    /// At this speed, the passes that replace a single pass meet the target.
+    /// The speed leaves time for the additional passes that replace lost returns.
     pub with_losses_mps: f64,
     /// Longest time between passes, seconds.
     pub pass_gap_s: f64,
-    /// Longest time between passes if these had been evenly spread, seconds.
+    /// Longest time between passes if the passes had been evenly spread, seconds.
     pub even_pass_gap_s: f64,
     /// Longest time between evenly spread passes if all heads had been turning, seconds.
     pub all_pass_gap_s: f64,
@@ -54,7 +54,7 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// The figures by which the sections of a run are counted.
+    /// Causes and speed of the section, for the counts of its run.
     pub fn failing(&self) -> Failing {
         Failing { causes: self.causes, again_mps: self.with_losses_mps }
     }

@@ -1,8 +1,8 @@
 //! Explains a fail by the smallest set of factors without which the hole would have met the target.
 //!
-//! The geometry shows how the hole would be without a factor. If samples are missing because of the factor, they are
-//! put back. Otherwise the wall is compressed by the ratio by which passes or steps would have been closer together.
-//! `docs/why/coverage.md` states the order of the factors and the reasons for it.
+//! The geometry shows how large the hole would be without a factor. Samples that are missing because of the factor
+//! are put back. For other factors, the wall is compressed by the ratio by which passes or steps would have been
+//! closer together. `docs/why/coverage.md` states the order of the factors and the reasons for it.
 
 mod case;
 mod driven;
@@ -25,9 +25,10 @@ use trial::Trial;
 pub use case::Case;
 use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 
-/// Ratio of T as driven to the target above which speed counts as a factor, even at the planned speed.
+/// Speed counts as a factor if the spacing T exceeds this multiple of the target, even at the planned speed.
 ///
-/// T is an upper bound of D.
+/// T is the spacing at the driven speed with all heads as scheduled. It is an upper bound of the hole's
+/// diameter D.
 const WELL_OVER: f64 = 1.2;
 /// Ratio of the speed to the planned speed above which the vehicle did not follow the plan.
 const OVER_PLAN: f64 = 1.15;
@@ -35,16 +36,15 @@ const OVER_PLAN: f64 = 1.15;
 ///
 /// The speed is then known from the inertial unit alone.
 const OVER_LOST: f64 = 1.4;
-/// Ratio of the speed to the largest speed that fits above which speed counts as a factor.
+/// Speed counts as a factor if it exceeds both the planned speed and the fitting speed by this ratio.
 ///
-/// The ratio is just above the measurement error of the speed. The planned speed replaces the largest speed that fits
-/// if it is higher.
+/// The ratio is just above the measurement error of the speed.
 const OVER_ALL: f64 = 1.03;
-/// Swing counts as a factor if the distance between passes without swing is below this share.
+/// Swing counts as a factor if, without it, the distance between passes shrinks below this share.
 ///
 /// Even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
-/// Ratio of the angular step from the centre to the target above which the step counts as a factor.
+/// Share of the target above which a step along the wall, seen from the tunnel's centre, is a factor.
 const COARSE: f64 = 0.75;
 
 /// Determines the causes of a section's hole from the sections within T of this section.
@@ -132,7 +132,8 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(over > well_over || is_over_plan || is_over_all, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
     let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
-    // At a speed above the planned one, heads apart along the hull may happen to pass evenly.
+    // Above the planned speed, the passes of heads mounted apart along the hull may be evenly spread by
+    // chance.
     let is_fast = drive.speed_mps > OVER_PLAN * drive.planned_mps;
     add(is_slow || is_uneven || is_fast && drive.all_gap_s < HELPS * drive.healthy_at_plan_s, Cause::Phase);
     let steady = Drive { swing_m: 0.0, ..*drive };

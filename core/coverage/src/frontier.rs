@@ -79,11 +79,11 @@ pub struct Frontier {
     ///
     /// Heads count whether they ping or not.
     way: Option<Reach>,
-    /// Stretch that the whole combined reach of all heads, pinging or not, has passed.
+    /// Stretch that all heads, pinging or not, have passed with their whole combined reach.
     ///
-    /// The stretch is empty (`from_m` above `to_m`) until the whole reach has passed a place.
+    /// The stretch is empty (`from_m` above `to_m`) until such a place exists.
     through: Option<Reach>,
-    /// Index range of the sections within the reach of the awaited heads plus a margin.
+    /// Zone: index range of the sections within the reach of the awaited heads plus a margin.
     zone: Option<Range<i64>>,
     /// Time of the zone's last change.
     zone_moved: Option<MonoNs>,
@@ -143,7 +143,7 @@ pub struct Outlook {
     pub to_come: Option<Reach>,
     /// Stretch behind the place where the vehicle began or turned back.
     ///
-    /// Not all heads have been in this stretch, and on the present course they will not be.
+    /// Not all heads have been in this stretch. On the present course, the other heads will not reach it.
     pub not_passed: Option<Reach>,
     /// Stretch that all heads, pinging or not, have passed; `None` before.
     pub through: Option<Reach>,
@@ -362,7 +362,9 @@ impl Moved {
         self.left_behind.contains(&section) || self.left_ahead.contains(&section)
     }
 
-    /// Whether no section left the zone or joined the coverage extent, or no head's place is known.
+    /// Whether nothing has changed: no section left the zone or joined the coverage extent.
+    ///
+    /// Also true if no head's place is known.
     pub fn is_nothing(&self) -> bool {
         let stayed = self.left_behind.is_empty() && self.left_ahead.is_empty() && !self.way_grown;
         stayed || self.to_come.is_none()

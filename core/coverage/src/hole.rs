@@ -37,7 +37,7 @@ pub const FARTHEST_M: f64 = 12.0;
 const NO_FINER_M: f64 = 1e-10;
 /// Upper limit of the rounding error of a distance, m.
 const ROUNDING_M: f64 = 1e-9;
-/// Owner of a tile without a known sample.
+/// Value of `owner` for a tile without a known sample.
 const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 /// Rounding tolerance with which a corner's bound counts as proven, m.
 const PROVEN_M: f64 = 1e-11;
@@ -80,7 +80,8 @@ struct Tile {
     half_arc_m: f64,
     /// Sample nearest to the tile's centre, relative to the centre, m.
     ///
-    /// In searches for any circle, this is a nearby sample, from the start of the section.
+    /// The searches for an empty circle of given size use it differently. They store the chainage and arc
+    /// length of any nearby sample, with the chainage from the start of the section.
     owner: (f64, f64),
     /// Upper bound of f in the tile, m.
     bound_m: f64,
@@ -104,7 +105,7 @@ struct Beyond {
 
 /// Search result near the centre of a tile.
 enum Near {
-    /// A sample is so near that it is within the radius of every point of the tile.
+    /// No empty circle has its centre in the tile: one sample is within the radius of all its points.
     Settled,
     /// The nearest sample, or an equally near one.
     Sample(Nearest),
@@ -113,7 +114,7 @@ enum Near {
 }
 
 impl Near {
-    /// Returns the sample and its distance, m; `None` if the tile is settled.
+    /// Returns the sample and its distance, m; `None` for [`Near::Settled`].
     fn unsettled(self) -> Option<(Option<Nearest>, f64)> {
         match self {
             Self::Settled => None,
@@ -144,7 +145,7 @@ impl Tile {
 
     /// Searches for a sample near the tile's centre.
     ///
-    /// If the owner (chainage and arc length) is near enough to settle the tile, the function does not search.
+    /// If the known sample `owner` is within the radius of the whole tile, the function does not search.
     /// Otherwise, it returns any sample that is near enough, or the nearest one.
     fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
         // The margins are larger than the rounding errors of the distances.
@@ -158,7 +159,7 @@ impl Tile {
         window.near_enough(self.x_m, self.arc_m, within_m, enough_m).map_or(Near::Nothing, Near::Sample)
     }
 
-    /// Returns the halves of a tile, owned by the nearest sample if one is within reach.
+    /// Returns the halves of a tile. Their `owner` becomes the nearest sample, if one is within reach.
     fn halves_of(mut self, nearest: Option<&Nearest>, perimeter_m: f64) -> [Self; 2] {
         if let Some(found) = nearest {
             self.owner = (found.x_m, found.arc_m + found.turns * perimeter_m);
@@ -279,7 +280,7 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile until its bound can't exceed the best point, which may lie in the tile.
+    /// Divides a tile among samples until none of its points can clearly exceed the best point's distance.
     ///
     /// Returns false if the tile must be halved first.
     fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {

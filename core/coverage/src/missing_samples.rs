@@ -25,7 +25,7 @@ pub struct MissingSample {
     pub arc_m: f64,
     /// Number of the head that would have made the sample.
     pub head: u8,
-    /// All causes without which the sample would exist; all of them would have to be absent.
+    /// Causes of the loss. The sample would exist only if all of them were absent.
     pub why: Causes,
 }
 

@@ -33,7 +33,7 @@ pub struct Passage {
     pub drive: Drive,
     /// Whether more pings without a fix were made than are stored.
     pub unseen: bool,
-    /// Whether a ping's place was too uncertain for its speed to be evidence.
+    /// Whether the place of a ping was too uncertain for the measured speed to count as evidence.
     ///
     /// The uncertainty is relative to the previous pass.
     pub adrift: bool,
@@ -100,18 +100,20 @@ pub struct Drive {
 /// A turn takes longer with a finer step or a longer range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherSettings {
-    /// Ratio of steps: that of the coarsest mode whose step is below the target, to the present step.
+    /// Step of the finer mode, divided by the present step.
+    ///
+    /// The finer mode is the coarsest one whose step is below the target.
     pub finer_step: f64,
-    /// Ratio of turn periods: that of the mode with this finer step, to the present period.
+    /// Turn period of the finer mode, divided by the present one.
     pub finer_turn: f64,
-    /// Ratio of turn periods: that of a longer range setting, to the present period.
+    /// Turn period with a longer range setting, divided by the present one.
     ///
     /// The setting is the shortest that reaches all wall from the centre.
     pub longer_turn: f64,
 }
 
 impl Default for OtherSettings {
-    /// Ratios for heads with unknown settings: the second finer mode, with the same turn period.
+    /// Ratios for heads with unknown settings. They assume a finer mode with the same turn period.
     fn default() -> Self {
         Self { finer_step: 0.375, finer_turn: 1.0, longer_turn: 1.0 }
     }
@@ -205,7 +207,7 @@ impl PassError {
 
     /// Whether `worst_m` exceeds a limit, m.
     ///
-    /// For most passes it is far below the limit. This is detected without a search around the profile.
+    /// For most passes, an upper bound is already below the limit, so no search around the profile is needed.
     pub fn exceeds(&self, limit_m: f64, profile: &Profile) -> bool {
         // The reference point lies within the profile, so no wall is farther from this point than half the perimeter.
         let [y_m, z_m] = profile.reference();

@@ -114,7 +114,8 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 impl Relief {
     /// Whether earlier returns near this place have the same deviation from the design.
     ///
-    /// An earlier wall return counts within the reach along the tunnel, a doubtful one within half of all limits.
+    /// The limits are the reach along the tunnel and the tolerance. An earlier wall return must be within both
+    /// limits, a doubtful one within half of each.
     pub(super) fn supports(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
         let (slab, bin) = place(placed, limits);
         (slab - 2..=slab + 2).any(|slab| {
@@ -140,7 +141,7 @@ impl Relief {
         }
     }
 
-    /// Counts a head's vote in its bin, and its effect on the votes of other heads.
+    /// Counts a head's vote in the bin of a return, and updates the votes on other heads there.
     pub(super) fn vote(&mut self, head: usize, placed: &PlacedReturn, limits: &WallLimits) {
         let (slab, bin) = place(placed, limits);
         // Returns between the two limits don't vote, because noise would make heads disagree at a single limit.
@@ -151,7 +152,7 @@ impl Relief {
         let (me, distrusted) = (bit(head), self.distrusted);
         let Some(cell) = self.cell_mut(slab, bin) else { return };
         if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
-            // A head sees the design here, so an object that was seen only once is gone.
+            // This head agrees with the design here, so an object that was seen only once is gone.
             cell.off = None;
         }
         let seen = if as_designed { &mut cell.as_designed } else { &mut cell.contradicting };

@@ -35,7 +35,9 @@ pub struct Run {
     pub to: i64,
     /// Number of the run's sections that fail.
     pub failed: u32,
-    /// Section with the largest hole, and this hole; for a cleared run, the last one before clearing.
+    /// Section with the largest hole, and this hole.
+    ///
+    /// In a cleared run, both are as of the time before the run was cleared.
     pub worst: (i64, Hole),
     /// Time of the run's first flag.
     pub raised: MonoNs,

@@ -134,11 +134,11 @@ pub struct Section {
     pub(super) explained_in_part: bool,
     /// Ping statistics of the passage through the section.
     pub passage: Passage,
-    /// T_x of the section's samples, m.
+    /// T_x of the section's samples: distance between passes, m.
     pub t_x_m: Spread,
-    /// T_y of the section's samples, m.
+    /// T_y of the section's samples: distance between neighbours of one sweep, m.
     pub t_y_m: Spread,
-    /// T of the section's samples, m.
+    /// T of the section's samples: lattice diagonal of T_x and T_y, m.
     pub t_m: Spread,
     /// Number of samples on the section's wall.
     pub samples: u32,

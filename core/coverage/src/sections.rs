@@ -320,9 +320,10 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Returns the evidence of a section, or that of a flagged neighbour if its cause is unknown.
+    /// Returns the evidence of a section.
     ///
-    /// The edge of a stretch thus has the causes of the stretch.
+    /// If its cause is unknown, the causes of a flagged neighbour replace it. The edge of a stretch thus has
+    /// the causes of the stretch.
     fn as_beside(&self, index: i64, evidence: Evidence) -> Evidence {
         if evidence.cause != Cause::Unknown {
             return evidence;

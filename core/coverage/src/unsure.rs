@@ -70,7 +70,8 @@ pub struct Stretch {
     pub to: i64,
     /// The stretch's unsure sections in two groups.
     ///
-    /// In the first group, the hole matters more; in the second, the error does.
+    /// In sections of the first group, the hole matters more than its error. In those of the second, the
+    /// error does.
     of: [Largest; 2],
 }
 
@@ -96,7 +97,7 @@ pub struct Driven {
     ///
     /// Heads apart along the hull are then out of phase.
     pub is_uneven: bool,
-    /// Whether heads were silent, or heard no wall; the speeds are those for all heads.
+    /// Whether heads were silent or detected no wall. The speeds are nevertheless those for all heads.
     pub is_short: bool,
 }
 

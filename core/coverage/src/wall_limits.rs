@@ -17,7 +17,7 @@ pub struct WallLimits {
     pub radius_m: f64,
     /// Distance along the tunnel within which an earlier pass counts.
     ///
-    /// The distance doesn't depend on the target T, so neither do the samples.
+    /// The distance doesn't depend on the target T, so the samples don't depend on it either.
     pub reach_m: f64,
 }
 

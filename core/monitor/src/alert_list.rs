@@ -168,8 +168,7 @@ impl ListedAlert {
         self.is_live() && self.priority != Priority::Caution && self.acknowledged.is_none()
     }
 
-    /// Whether the alert sounds at `now`. Its condition holds then, and nobody has acknowledged or silenced
-    /// the alert.
+    /// Whether the alert sounds at `now`: its condition holds, and nobody has acknowledged or silenced it.
     pub fn sounds(&self, now: MonoNs) -> bool {
         let is_silenced = self.silenced_until.is_some_and(|until| now < until);
         self.state == AlertState::Active && self.needs_acknowledgement() && !is_silenced

@@ -155,7 +155,7 @@ impl App {
         self.world.insert_resource(resource);
     }
 
-    /// Keeps the published words of every tick, for recording or comparison.
+    /// Keeps the contents of the result streams of every tick, for recording or comparison.
     pub fn keep_results(&mut self) {
         let mut digests = Digests::default();
         digests.keep();

@@ -175,7 +175,7 @@ impl App {
 
     fn insert_messages(&mut self) {
         let world = &mut self.world;
-        // A jump along the tunnel may request every section at once.
+        // A jump along the tunnel may make all sections due for judging at once.
         let most = world.resource::<Coverage>().sections.len() + MAX_TICK_PACKETS;
         world.insert_resource(Inbox::default());
         world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));

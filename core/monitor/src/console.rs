@@ -2,7 +2,7 @@
 //!
 //! A packet is one JSON object, a [`Command`]. Packets pass a ring and the merge, like a sensor's bytes. They
 //! are recorded as `/raw/console`, so a replay has them at the same place. The console is not a sensor: it
-//! has no lamp, no readings, and no part in navigation.
+//! has no status lamp, no readings, and no part in navigation.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

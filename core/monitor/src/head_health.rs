@@ -10,8 +10,8 @@ use headrace_geometry::math::{self, TAU};
 const DEAF_RAD: f64 = TAU;
 /// Averaging angle for the share of returns that are off the design, radians.
 const ELSEWHERE_RAD: f64 = TAU / 2.0;
-/// A head is stuck if it reports one range over this angle, radians, while the deviation from the design
-/// varies by this much, m.
+/// A head is stuck if it returns a constant range over this angle, radians, while the deviation from the
+/// design varies by this much, m.
 const STUCK_RAD: f64 = TAU / 2.0;
 const STUCK_M: f64 = 0.3;
 /// Share of returns off the design above which a head is deaf, and limit for the share of another head.
@@ -30,11 +30,11 @@ pub struct HeadHealth {
     heard_rad: f64,
     /// Share of the latest returns that are off the design.
     elsewhere: f64,
-    /// Successive returns of one range.
+    /// Successive returns with the same range.
     same: SameRange,
 }
 
-/// Successive returns of one range, identical to the last bit.
+/// Successive returns with ranges identical to the last bit.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct SameRange {
     range_m: f64,
@@ -101,12 +101,12 @@ impl HeadHealth {
         self.unheard_rad >= DEAF_RAD
     }
 
-    /// Whether the head detects no wall at all.
+    /// Whether the head is deaf: it detects no wall at all.
     ///
-    /// The head is deaf in three cases. A whole turn gave no return. Half a turn gave one range although the
-    /// wall's distance varies. Nearly all returns are off the design while another head detects the wall:
-    /// `others` has the other heads' [`HeadHealth::elsewhere`]. If all heads see something else, the position
-    /// or the design is wrong, and no head is deaf for that.
+    /// A head is deaf in three cases. A whole turn gave no return. All returns of half a turn have the same
+    /// range although the wall's distance varies. Nearly all returns are off the design while another head
+    /// detects the wall: `others` has the other heads' [`HeadHealth::elsewhere`]. If the returns of all heads
+    /// are off the design, the position or the design is wrong, and no head counts as deaf.
     pub fn is_deaf(&self, mut others: impl Iterator<Item = f64>) -> bool {
         let [most, least] = ELSEWHERE;
         self.hears_nothing()

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Maximum difference between equal angles, radians. The finest step of any head, 0.3 degrees, is much
-/// larger.
+/// Angles that differ by at most this much count as equal, radians. The finest step of any head, 0.3 degrees,
+/// is much larger.
 const SAME_ANGLE_RAD: f64 = 1e-6;
 /// Minimum angle over which the turn rate is measured, radians. Until the head has turned that far, the whole
 /// angle so far is used.

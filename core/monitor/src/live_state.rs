@@ -171,7 +171,8 @@ pub struct LiveState {
     pub metres: LiveMetres,
     /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
-    /// Whether all wall that the heads see here has passed, by chainage and verdicts.
+    /// Whether all wall that the heads see here has passed. The vehicle's chainage and the verdicts decide
+    /// this.
     pub passed: bool,
     /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
     pub back_to_m: Option<f64>,
@@ -299,7 +300,7 @@ impl LiveState {
 
     /// Share of lost returns; `None` unless compensating for the losses costs at least a fifth of the speed.
     pub fn lost_share(&self) -> Option<f64> {
-        /// Share of the speed that remains after a loss of a fifth.
+        /// Share of the speed that remains if losses cost a fifth of it.
         const LEFT: f64 = 0.8;
         let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
         let margins = advice.margins?;
@@ -312,7 +313,8 @@ impl LiveState {
     }
 }
 
-/// Bitmask of the sources of the heads in a set. The set has the heads by number.
+/// Bitmask of the sources that belong to a set of heads. `sources` are the heads' sources, in order of head
+/// number.
 pub(super) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
     let numbered = sources.enumerate().filter(|(head, _)| of.has(*head));
     numbered.fold(0, |bits, (_, source)| bits | 1 << u64::from(source.0 % 64))

@@ -14,7 +14,8 @@ const WORDS: usize = BINS / 64;
 const WINDOW: u32 = 4096;
 /// Minimum number of pings for a share. With fewer, a single loss would count too much.
 const LEAST: u32 = 100;
-/// Weight of the overall share in the share after a lost ping, in pings. It matters while lost pings are few.
+/// Weight of the overall share of losses in the share of losses after a lost ping, in pings. It matters while
+/// lost pings are few.
 const USUAL: f64 = 50.0;
 /// Share of lost pings above which a head is nearly deaf. Hardly any angle then gives a return in two
 /// successive turns.
@@ -60,9 +61,9 @@ impl Angles {
 
 /// Losses of one head; part of the loop's state.
 ///
-/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. Some
-/// wall is silent turn after turn, such as a side tunnel or wall at a grazing angle. Its returns are not lost
-/// by chance, neither at its beginning nor at its end.
+/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side
+/// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such returns are not lost by
+/// chance, neither the first nor the last of them.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
     /// Whether the wall was detected at each angle in the last turn, and in the turn before that.

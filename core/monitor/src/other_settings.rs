@@ -18,7 +18,7 @@ use headrace_vehicle::Mission;
 
 /// Longest range setting tried, m. Settings are tried in whole metres.
 const LONGEST_M: u32 = 200;
-/// Maximum difference between equal steps, radians.
+/// Steps that differ by at most this angle count as equal, radians.
 const SAME_STEP_RAD: f64 = 1e-6;
 
 impl HeadSpecification {
@@ -32,8 +32,8 @@ impl HeadSpecification {
     pub fn settings(&self, name: &str, profile: &Profile, target_m: f64) -> HeadSettings {
         let [_, own_m] = self.spec.range_m;
         let range_m = self.reaching.as_ref().map(|(range_m, _)| *range_m);
-        // The live advice uses the same number of rays. Both name modes on the same screen, so the modes must
-        // agree.
+        // The live advice uses the same number of rays. Its mode and this mode appear on the same screen, so
+        // they must agree.
         let rays = Looks::default().ring;
         let ring = self.ring_in_the_middle(profile, rays).unwrap_or_default();
         let finer = self.finer(target_m, |step_rad| ring.largest_step_m(Ring::stride(step_rad, rays)));

@@ -96,8 +96,8 @@ impl CauseFigures {
 
     /// Speed for passing the stretch again, m/s. `v_max_mps` is the speed advised now.
     ///
-    /// If the heads have to be mended first, the speed is that of the heads as scheduled. Otherwise it is the
-    /// lower of the two.
+    /// If the heads have to be mended or set first, it is the stretch's own speed with the heads as
+    /// scheduled. Otherwise it is the lower of that speed and `v_max_mps`.
     pub fn again_mps(&self, v_max_mps: f64) -> f64 {
         let mended =
             [Cause::HeadSilent, Cause::HeadStalled, Cause::Phase, Cause::AngularStep, Cause::OutOfRange];

@@ -271,7 +271,8 @@ impl Loop {
         self.coverage().frontier.outlook(self.of_sensors().filter_map(|reach: &HeadFrontier| reach.0), at)
     }
 
-    /// Judges the unsettled sections at the end of a dive, when no more samples will come.
+    /// Judges the sections whose verdict may still change, at the end of a dive, when no more samples will
+    /// come.
     ///
     /// `hear` gets the notices in batches, with the loop's state after each batch. All notices of a long dive
     /// at once would take more memory than its samples.

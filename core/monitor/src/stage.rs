@@ -37,8 +37,8 @@ impl Stage {
         Self::Publish,
     ];
 
-    /// Whether the stage georeferences pings or prepares that. A replay may run these stages on another
-    /// thread.
+    /// Whether the stage georeferences pings or is needed before that. A replay may run these stages on
+    /// another thread.
     pub(super) fn is_placing(self) -> bool {
         matches!(self, Self::Decode | Self::Navigate | Self::Georeference)
     }
@@ -49,7 +49,8 @@ impl Stage {
     }
 }
 
-/// Marks a world whose pings are georeferenced elsewhere. The lists of these stages come with each tick.
+/// Marks a world whose pings are georeferenced by another part of a split loop. Each tick then brings the
+/// lists of these stages.
 #[derive(Debug, Resource)]
 pub(super) struct PlacedElsewhere;
 

@@ -41,7 +41,8 @@ pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let t_m = Some(planner.t_max_m(shown.mode, shown.speed_mps)?).filter(|t_m| t_m.is_finite());
     let places = || specs.iter().map(|spec| spec.mount.position.x());
     let apart_m = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
-    // Length for a whole turn in which the largest gap is searched for, plus the detail around the gap.
+    // The search for the largest gap needs the length of a whole turn, and the detail needs some length
+    // around the gap.
     let wanted_m = (turns_shown(specs.len()) * pitch_m).max(pitch_m + 3.2 * t_m.unwrap_or(0.0));
     let steps = turn.map_or(1.0, |turn| f64::from(turn.steps())) * specs.len().max(1) as f64;
     let turns = ((wanted_m + apart_m.max(0.0)) / pitch_m + 1.0).min(MOST_SAMPLES / steps).max(2.0);
@@ -63,7 +64,7 @@ pub(super) fn turns_shown(heads: usize) -> f64 {
 
 /// Chainages from where the last head begins to where the first head ends.
 ///
-/// If that is less than a turn, it is the whole pattern.
+/// If they span less than a turn, returns the ends of the whole pattern.
 fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {
     let of = |head: usize| samples.iter().filter(move |sample| sample.head == head).map(|sample| sample.x_m);
     let firsts = (0..heads).map(|head| of(head).fold(f64::INFINITY, f64::min));

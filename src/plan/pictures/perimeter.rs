@@ -167,7 +167,8 @@ fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     }
 }
 
-/// Draws captions above the thin stretches. They name the number of heads that see the stretch.
+/// Draws captions above the thin stretches, which fewer heads see. A caption states the number of these
+/// heads.
 fn captions(chart: &Chart<'_>, stretches: &[Thin]) {
     let mut last: Option<(f64, [String; 2])> = None;
     for stretch in stretches {

@@ -18,7 +18,7 @@ pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace
     worst.min_by(|a, b| off_m(a).total_cmp(&off_m(b))).copied()
 }
 
-/// A stretch of the perimeter that fewer heads see than see the best-covered stretch.
+/// A thin stretch of the perimeter: fewer heads see it than see the best-covered part of the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Thin {
     pub(super) from_m: f64,

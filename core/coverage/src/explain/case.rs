@@ -9,9 +9,9 @@ use crate::passage::{Drive, Passage};
 use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 
-/// Largest ratio of distances, without and with a factor, at which the removal of the factor helps.
+/// The removal of a factor helps only if it reduces the spacing to below this share.
 pub(super) const HELPS: f64 = 0.93;
-/// Largest hole size for which the surroundings are searched for missing samples, in targets.
+/// Largest hole size for which the surroundings are searched for missing samples, in multiples of the target.
 pub(super) const WIDEST: f64 = 8.0;
 
 /// A failed section and its surroundings.
@@ -35,13 +35,13 @@ pub struct Case<'a> {
     pub is_torn: bool,
     /// Target T, m.
     pub target_m: f64,
-    /// Causes named for the neighbouring sections, which are preferred among equally small sets.
+    /// Causes of the two neighbouring sections. Among equally small sets of causes, these are preferred.
     pub beside: [Causes; 2],
     /// Latest missing samples.
     pub lacks: &'a MissingSamples,
 }
 
-/// Counts over the sections, and the driving figures at the moment with the largest T as driven.
+/// Counts over the sections, and the driving figures at the moment with the largest distance between passes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Seen {
     pub(super) pings: u32,
@@ -91,8 +91,8 @@ pub(super) fn is_passed(case: &Case<'_>) -> bool {
 
 /// Whether the pings of silent heads can't be reconstructed.
 ///
-/// True in sectors, for heads that never pinged, or if all heads were silent for longer than the list of missing
-/// samples covers.
+/// True in each of three cases: the heads sweep in sectors, a silent head never pinged, or all heads were silent
+/// for longer than the list of missing samples covers.
 pub(super) fn is_dark(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_in_sectors || is_unheard(case, seen)
 }
@@ -111,9 +111,9 @@ pub(super) fn is_remembered(case: &Case<'_>) -> bool {
     lacking.any(|lack| lack.why.has(Cause::HeadSilent))
 }
 
-/// Whether a missing sample lies in a hole, up to the size of the target.
+/// Whether a missing sample lies in the middle of a hole.
 ///
-/// Only the size of the target counts, because the hole may still shrink from ahead.
+/// The middle is at most as large as the target, because samples from ahead may still shrink the hole.
 pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
     let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
     math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0

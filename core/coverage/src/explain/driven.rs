@@ -8,7 +8,7 @@ use headrace_geometry::math;
 use headrace_sampling::losses::MOST_PASSES;
 
 impl Drive {
-    /// Largest speed that fits if this many passes replace a single pass, m/s.
+    /// Largest speed that leaves time for this many passes in place of one, m/s.
     ///
     /// Zero if so many returns are lost that no useful speed remains.
     pub(crate) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
@@ -23,10 +23,10 @@ impl Drive {
         }
     }
 
-    /// Returns these figures with some factors removed.
+    /// Returns the driving figures with some factors removed.
     ///
-    /// `margin_m` is the target less a margin, m, and determines the speed that would have been right. With
-    /// `all_turn`, no head is silent or out of step.
+    /// `margin_m` is the target less a margin, m; a corrected speed is computed from it. With `all_turn`, no
+    /// head is silent or stalled.
     pub(super) fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
         let mut slower = 1.0;

@@ -8,7 +8,7 @@ const PERIMETER_M: f64 = 18.0;
 const TARGET_M: f64 = 0.5;
 const BOUNDS_M: (f64, f64) = (10.0, 10.25);
 
-/// Four heads at FAST, 8 s per turn, at 0.19 m/s for a target of 0.5 m.
+/// Driving figures for four heads in the mode FAST with 8 s per turn, at 0.19 m/s, for a target of 0.5 m.
 fn sound() -> Drive {
     Drive {
         speed_mps: 0.19,
@@ -155,11 +155,11 @@ fn both_causes_are_named_only_if_both_are_needed() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let why = Causes::of(Cause::MissingReturns);
     assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
-    // Scattered losses enlarge the hole, but they are not needed for the fail.
+    // Scattered losses enlarge the hole, but without them the section would still fail.
     let here = Some([[10.4, 10.5], [3.0, 3.1]]);
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
-    // A sample missing for two reasons needs both removed.
+    // A sample that is missing for two reasons is put back only if both are removed.
     let both = Causes::of(Cause::PositionLost).with(Cause::OutOfRange);
     assert_eq!(
         named(&Wall { bare: BARE, why: both, ..Wall::default() }),
@@ -239,19 +239,19 @@ fn cause_has_the_same_word_in_text_and_json() {
     }
 }
 
-/// The distance that fits is shared by all needed passes and the time of a ping.
+/// The fitting distance is driven in the time of all needed passes and of one ping.
 #[test]
 fn speed_with_losses_leaves_time_for_all_needed_passes() {
     let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };
     assert!((drive.with_losses_mps(1.0) - 0.19).abs() < 1e-12);
-    // The speed is 0.4 m divided by the time of 1.5 passes of 2 s and a ping.
+    // The vehicle drives 0.4 m in the time of 1.5 passes of 2 s each and one ping.
     assert!((drive.with_losses_mps(1.5) - 0.4 / 3.02).abs() < 1e-12);
     assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "not faster than without losses");
 }
 
-/// Expected times between passes for each set of removed factors.
+/// Checks the time between passes for each set of removed factors.
 ///
-/// The measured times are those as driven, as scheduled, without stalls, and at the planned speed.
+/// `drive` has this time as driven, as scheduled, without stalls, and at the planned speed.
 #[test]
 fn time_between_passes_depends_on_the_removed_causes() {
     let drive = Drive {
@@ -308,7 +308,7 @@ fn time_between_passes_depends_on_the_removed_causes() {
 fn removed_speed_cause_gives_the_largest_speed_that_fits() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
     let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
-    // The speed is 0.4 m divided by the time of a pass, 2 s, and of a ping.
+    // The vehicle drives 0.4 m in the time of one pass, 2 s, and one ping.
     assert!((slowed_mps(drive) - 0.4 / 2.02).abs() < 1e-9, "{}", slowed_mps(drive));
     assert!(
         (slowed_mps(Drive { fits_mps: 0.1, ..drive }) - 0.1).abs() < 1e-9,
@@ -324,7 +324,7 @@ fn removed_speed_cause_gives_the_largest_speed_that_fits() {
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
 }
 
-/// At 0.1 m/s, heads pass as far apart after 4 s as after 2 s at the planned 0.2 m/s.
+/// Passes 4 s apart at 0.1 m/s have the same distance as passes 2 s apart at the planned 0.2 m/s.
 ///
 /// The planned speed helps only if distances shrink by more than the factor `HELPS`.
 #[test]

@@ -22,7 +22,7 @@ const MOST: f64 = 3.0;
 const AT_MOST: f64 = 1.3;
 /// Maximum number of halvings in the search for the hole with all missing samples put back.
 const SEARCHED: u32 = 5;
-/// Share of missing samples with remaining causes above which these causes alone make a hole.
+/// If more than this share of the missing samples has remaining causes, these causes alone make a hole.
 const STAYS: f64 = 0.15;
 /// Maximum number of causes in a set.
 const MOST_NAMED: u32 = 3;
@@ -36,7 +36,7 @@ pub(super) struct Trial<'a> {
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// Factors that were present, and the subset of them that has missing samples.
+    /// Factors that were present, and those of them that caused missing samples.
     present: Causes,
     lacking: Causes,
     left: u32,
@@ -78,8 +78,8 @@ impl<'a> Trial<'a> {
     /// Smallest set of present factors without which the section would have met the target.
     pub(super) fn smallest(&mut self) -> Causes {
         let silent = Causes::of(Cause::HeadSilent);
-        // If no head pinged, silence comes first. Driving is then no cause, but the heads might not have heard the
-        // wall for other reasons.
+        // If no head pinged, silence is a certain cause, and driving is none. Other causes remain possible,
+        // because even pinging heads might not have detected the wall.
         let surely = if self.case.is_dark { silent } else { Causes::default() };
         if self.case.is_dark {
             let is_driven = |cause: &Cause| {
@@ -110,7 +110,7 @@ impl<'a> Trial<'a> {
 
     /// Returns the set without `occluded` if the rest nearly suffices and wall is out of range.
     ///
-    /// Heads that hide wall from each other also do so with a longer range, and other heads see this wall.
+    /// With a longer range, heads still hide wall from each other, but other heads see that wall.
     fn less_occluded(&mut self, set: Causes) -> Causes {
         let rest = set.without(Cause::Occluded);
         let is_far = set.has(Cause::Occluded) && set.has(Cause::OutOfRange);
@@ -159,13 +159,15 @@ impl<'a> Trial<'a> {
         self.seen.adrift && !self.seen.unseen && !self.case.is_torn
     }
 
-    /// Returns the factors in every sufficient set: without one of them, all others don't suffice.
+    /// Returns the factors that every sufficient set contains.
+    ///
+    /// Without any one of them, all other factors together don't suffice.
     fn needed(&mut self, present: Causes) -> Causes {
         let mut is_needed = |cause: &Cause| !self.passes_without(present.without(*cause), 1.0);
         present.iter().filter(|cause| is_needed(cause)).collect()
     }
 
-    /// Whether the section would have met `times` the target with some factors removed.
+    /// Whether the section's hole would be at most `times` the target with some factors removed.
     fn passes_without(&mut self, removed: Causes, times: f64) -> bool {
         if self.left == 0 {
             return false;
@@ -207,7 +209,7 @@ impl<'a> Trial<'a> {
 
     /// Distance between neighbouring samples with some factors removed, m, from the movement alone.
     ///
-    /// Infinite if many samples are missing for the remaining factors.
+    /// Infinite if many samples are missing because of the remaining factors.
     fn stays_m(&self, removed: Causes) -> f64 {
         let Case { bounds_m, lacks, .. } = *self.case;
         let (mut all, mut stay) = (0_u32, 0_u32);
@@ -279,7 +281,7 @@ impl<'a> Trial<'a> {
         self.case.to_come.filter(|_| is_passed(self.case))
     }
 
-    /// Returns the changes of the wall if some factors are removed.
+    /// Returns the changes to the wall that result from removing some factors.
     fn otherwise(&mut self, removed: Causes) -> WallChanges {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;
@@ -300,7 +302,7 @@ impl<'a> Trial<'a> {
         let [now, then] = self.drives(removed);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
-        // The driving figures of a single moment must not explain more than the hole.
+        // The driving figures are those of a single moment, so the size of the hole limits their effect.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         WallChanges {

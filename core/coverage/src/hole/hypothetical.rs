@@ -28,14 +28,14 @@ impl WallChanges {
     /// No change.
     pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
 
-    /// Distance of a chainage from the nearest covered stretch or the stretch to come, m.
+    /// Distance of a chainage from wall that counts as covered or where samples may still land, m.
     fn clear_m(&self, x_m: f64) -> f64 {
         let off_m = |reach: &Reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0);
         let covered_m = self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along;
         self.to_come.as_ref().map(off_m).map_or(covered_m, |to_come_m| covered_m.min(to_come_m))
     }
 
-    /// End of the stretch to come, at which the wall is mirrored, as chainage, m.
+    /// Chainage at which the wall is mirrored, m: the finite end of the stretch where samples may still land.
     fn mirror_m(&self) -> Option<f64> {
         self.to_come.iter().flat_map(|reach| [reach.from_m, reach.to_m]).find(|x_m| x_m.is_finite())
     }

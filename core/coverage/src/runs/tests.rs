@@ -29,7 +29,7 @@ impl Rig {
 
     fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        // A speed helps for all but the largest holes.
+        // No speed helps against holes of a metre or more.
         let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
         let failing = causes.map(|causes| Failing { causes, again_mps });
         (self.failing[slot], self.holes[slot]) = (failing, diameter_m);
@@ -113,7 +113,7 @@ fn runs_grow_and_merge_and_are_cleared() {
     let first = *rig.runs.get(RunId(0)).unwrap();
     assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
     assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
-    // On either side, the last section that would still join the run, and the first that would not.
+    // Sections 7 and 19 are the farthest that would still join the run. Sections 6 and 20 would not join it.
     assert_eq!([6, 7, 19, 20].map(|section| rig.runs.is_beyond(&first, section)), [true, false, false, true]);
     for section in [10, 11, 14, 16] {
         rig.say(section, None, 0.2);

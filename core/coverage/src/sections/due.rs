@@ -1,7 +1,7 @@
 //! Decides which sections are due for judging.
 //!
-//! A section is due if the heads have left it, or if a part of it may certainly fail. At the end of a dive, all
-//! sections that aren't settled are due.
+//! A section is due if the heads have left it, or if a part of it may certainly fail. At the end of a dive, a
+//! section is due if its verdict may still change.
 
 use super::super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::super::hole::{FARTHEST_M, Needed};
@@ -14,7 +14,7 @@ use headrace_geometry::math;
 /// This distance bounds the delay of a flag.
 const LOOK_M: f64 = 0.125;
 
-/// Limits that require a check at the next movement, because every finite reach is beyond them.
+/// Limits that every finite reach has passed, so that the next movement causes a check.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Sections {
@@ -27,7 +27,8 @@ impl Sections {
 
     /// Sets the next places to check.
     ///
-    /// Wall behind the vehicle is left in steps of a part of a section. So is wall ahead if the vehicle goes back.
+    /// A check is due each time the heads have left a further part of a section: behind the vehicle, or ahead of a
+    /// vehicle that goes back.
     fn look_again(&mut self, to_come: Option<Reach>) {
         let Some(Reach { from_m, to_m }) = to_come else { return };
         let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
@@ -61,7 +62,7 @@ impl Sections {
             }
         }
         let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
-        // The sections at the zone's ends may be left in part.
+        // The heads may have left only a part of the sections at the zone's ends.
         let behind = moved.left_behind.end - far..moved.left_behind.end + 1;
         let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
         for range in [behind, ahead] {
@@ -96,7 +97,7 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for sections of the still zone.
+    /// Calls `ask` for sections in reach of a vehicle that is nearly stationary.
     ///
     /// Without this call, these sections would get no verdict while the vehicle is stationary. A section is due if it
     /// may certainly fail although its hole may still get samples, or if it is flagged and has new samples since it
@@ -165,7 +166,8 @@ mod tests {
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
-    /// Partly left sections are checked every few centimetres of travel, behind and ahead.
+    /// Sections that the heads have left in part are checked every few centimetres of travel, behind and
+    /// ahead.
     #[test]
     fn next_check_is_due_after_a_few_centimetres_of_travel() {
         let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);

@@ -38,7 +38,7 @@ fn metres_are_counted_by_the_latest_verdicts() {
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
 }
 
-/// A section with pings has its own error.
+/// A section with pings has the error of its own passes.
 ///
 /// A section without pings has the largest error of the sections within T / 2, and no other.
 #[test]

@@ -121,7 +121,7 @@ struct Brick {
     slot: u16,
     /// Coarsest thinning tier applied.
     tier: u8,
-    /// Whether the brick has been packed before.
+    /// Whether the brick has been packed before, which may have moved its samples.
     moved: bool,
 }
 

@@ -20,7 +20,7 @@ pub(super) const MOVED_M: f64 = 8.6e-6;
 pub(super) const ROOM: usize = 31;
 /// Maximum number of words per sample.
 pub(super) const MOST_WORDS: usize = 7;
-/// Lower half of an escape word, which stands for no difference.
+/// Lower half of an escape word. No difference between samples is stored with this value.
 const ESCAPE: u16 = 0x8000;
 const PLACE: u16 = 0;
 const STEPPED: u16 = 1;

@@ -34,7 +34,9 @@ impl Place {
     }
 }
 
-/// A brick that a search has reached on one side.
+/// State of a pass search on one side of the query point.
+///
+/// The search has reached this brick, a group of cell rows.
 #[derive(Debug, Clone, Copy, Default)]
 struct Side {
     brick: Option<u32>,

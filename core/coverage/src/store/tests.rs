@@ -50,9 +50,9 @@ fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Distances in chainage from a point to every crossing of the point's arc length.
+/// Distances in chainage from a point to every place where a step crosses the point's arc length.
 ///
-/// The crossings are interpolated on each step.
+/// The chainage of a crossing is interpolated along its step.
 fn crossings(samples: &[WallSample], (x_m, arc_m): (f64, f64)) -> Vec<f64> {
     let mut found = Vec::new();
     for end in samples {
@@ -258,7 +258,8 @@ fn stationary_vehicle_stops_using_more_memory() {
     assert!(store.fidelity(100.0, 100.0).thinned_m <= 0.02);
 }
 
-/// A full cell drops a step only if a nearby step has the same direction, which distinguishes passes.
+/// A full cell drops a step only if a nearby step has the same direction, because the direction distinguishes
+/// passes.
 #[test]
 fn step_is_dropped_only_near_a_step_in_the_same_direction() {
     let mut store = SampleStore::new(LAYOUT);

@@ -11,8 +11,8 @@ pub const MOST_WAITING: usize = 24;
 /// The run has a jump to the wall on both sides. It hangs in the water, or is an echo off two walls. Rocks, heaps,
 /// niches and caves are about as wide as they are high or deep. Side tunnels appear as deep as they are wide.
 ///
-/// Tuned on the murk of the field table: clusters of returns in it are at least 12 times as far from the wall as they
-/// are wide.
+/// Tuned on the condition `murk` of the field table: its clusters of returns are at least 12 times as far from the
+/// wall as they are wide.
 const SLENDER: f64 = 4.0;
 
 /// A run of returns, as described in the parent module.

@@ -112,7 +112,8 @@ impl AlertList {
             self.share_one(at, to);
         }
         let oldest = self.alerts.iter().position(|alert| !alert.is_live());
-        // There are far fewer situations other than missed stretches than entries.
+        // If all alerts are live, most of them are missed stretches: the list has far more entries than there
+        // are other situations.
         let oldest =
             oldest.or_else(|| self.alerts.iter().position(|alert| alert.priority == Priority::Caution));
         if let Some(oldest) = oldest {

@@ -73,7 +73,7 @@ impl AlertList {
         let v_max_mps = self.v_max_mps;
         let figures =
             input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
-        // A later pass has left over this part of a stretch, and the stretch already has an alert.
+        // If a later pass has left only this part of a stretch missed, the stretch already has an alert.
         let (from, until) = input.stretch;
         let has = |alert: &&ListedAlert| {
             alert.kind == ListKind::Missed

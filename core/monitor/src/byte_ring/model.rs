@@ -93,7 +93,7 @@ impl ByteConsumer for ModelConsumer {
 /// A reading end that claims that all bytes are present, so that a protocol doesn't wait for the whole
 /// packet.
 ///
-/// Models of broken protocols use it. loom must find them to fail.
+/// Models of deliberately broken protocols use it. loom must detect that they fail.
 pub struct Hasty(pub ModelConsumer);
 
 impl ByteConsumer for Hasty {

@@ -99,7 +99,7 @@ impl Condition {
 }
 
 impl LiveState {
-    /// Whether the T forecast at the present speed is above this limit, m, or unbounded.
+    /// Whether the spacing T that is forecast at the present speed is above this limit, m, or unbounded.
     fn turn_exceeds(&self, limit_m: f64) -> bool {
         self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)
     }

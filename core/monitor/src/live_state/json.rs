@@ -90,7 +90,7 @@ pub struct PositionJson {
 pub struct MarginsJson {
     /// v_max minus the present speed, m/s; negative if the speed is too fast.
     pub speed_mps: Option<f64>,
-    /// Target minus the T forecast for the present turn, m; negative if the turn fails.
+    /// Target minus the spacing T that is forecast for the present turn, m; negative if the turn fails.
     pub turn_m: Option<f64>,
     /// Part of the target used up by position errors, m.
     ///

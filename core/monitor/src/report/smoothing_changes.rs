@@ -29,7 +29,7 @@ fn judged(section: &SectionReport) -> JudgedReport {
 
 /// Lists the sections whose verdict differs.
 ///
-/// Both inputs are in the order of chainage. Either may have sections that the other lacks.
+/// Both inputs are in the order of chainage. Either may have sections that are missing in the other.
 fn changes(before: &[SectionReport], after: &[SectionReport]) -> Vec<ChangeReport> {
     let (mut before, mut after) = (before.iter().peekable(), after.iter().peekable());
     let mut changed = Vec::new();

@@ -28,7 +28,8 @@ pub(crate) struct Alerting<'a> {
 }
 
 impl Alerting<'_> {
-    /// Applies everything that comes before the update that precedes the event with this index.
+    /// Applies everything that was consumed before an update. `event` is the index of the first event after
+    /// the update.
     pub(crate) fn before(&mut self, event: usize, state: &mut LiveState) {
         self.until(Some(event), state);
         self.hear(state, event);
@@ -56,7 +57,7 @@ impl Alerting<'_> {
         self.taken.2 = until.max(self.taken.2);
     }
 
-    /// Applies runs and commands up to an update, or all.
+    /// Applies runs and commands up to an update, or all of them.
     ///
     /// A command comes before the results of the event that follows it.
     fn until(&mut self, beat: Option<usize>, state: &mut LiveState) {

@@ -30,8 +30,8 @@ const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 const SOON_S: f64 = 5.0;
 /// Speed at or below which the vehicle counts as going back, m/s.
 const ASTERN_MPS: f64 = -0.02;
-/// Number of standard deviations of the error against the previous pass. If they reach the target, a ping is
-/// no evidence of the speed.
+/// A ping is no evidence of the speed if this many standard deviations of its error relative to the previous
+/// pass reach the target.
 const ADRIFT_SD: f64 = 2.0;
 
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are its inputs and outputs")]

@@ -46,7 +46,7 @@ pub(super) fn note_beat(
         } else if situation.deaf.has(head.0) {
             note_silence(coverage, head.0, None, here);
         } else if frontier.0.is_none() {
-            // The head hasn't been heard yet. It may be about to ping.
+            // No ping of this head has arrived yet, but one may come soon.
             frontier.0 = Some(HeadReach::silent_at(None, here));
         }
     }

@@ -17,7 +17,7 @@ use headrace_sampling::margin::position_margin_m;
 use headrace_sampling::passes::{Passes, Phasing, Situation};
 use headrace_sampling::swing::Looks;
 
-/// Longest time between neighbouring passes that the rotation of the vehicle is looked up for, seconds.
+/// Longest time between neighbouring passes for which the rotation of the vehicle is looked up, seconds.
 const LONGEST_S: f64 = 50.0;
 /// Relative change of the time between passes above which the fitting speed is computed again.
 const SAME_PASSES: f64 = 0.01;
@@ -30,15 +30,14 @@ const RAYS: u32 = 72;
 const MOVED_M: f64 = 0.05;
 /// Heads are in phase if the time between passes is at most this multiple of the scheduled time.
 const IN_STEP: f64 = 1.05;
-/// Number of classes of waiting time in a sector.
+/// Number of classes into which the places in a sector are divided by the wait until the next pass.
 ///
-/// At an end of the sector, the wait for the next pass is a whole sweep there and back. In the middle it is
-/// half of that.
+/// At an end of the sector, this wait is a whole sweep there and back. In the middle it is half of that.
 const WAITS: usize = 4;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 
-/// Requirements of a dive on the driving.
+/// Target and settings by which the driving of a dive is judged.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
     /// Speed for which the heads are set in phase, m/s; zero if none is planned.
@@ -59,7 +58,7 @@ pub(crate) struct Driving {
     /// were last computed.
     step_rad: f64,
     place_m: [f64; 2],
-    /// Largest steps along the wall by class of waiting time, m.
+    /// Largest steps along the wall, m, by class of the wait until the next pass.
     ///
     /// In class n the wait is at most 1 - n / 8 of the longest wait. With heads that turn continuously, all
     /// waits are equal.
@@ -188,8 +187,8 @@ impl Driving {
         let gap_at_plan_s = gap_s(&as_it_is.at(plan_mps));
         let healthy_at_plan_s = gap_s(&phasing.at(plan_mps));
         let all_turn = turning == situation.configured && self.lacking.all_turn(at);
-        // At a speed other than the planned one, heads in phase may pass unevenly, and heads out of phase
-        // evenly.
+        // At a speed other than the planned one, the evenness of passes doesn't show whether the heads are in
+        // phase. The times at the planned speed are therefore compared.
         if all_turn && gap_at_plan_s <= IN_STEP * gap_s(&scheduled_at_plan).min(healthy_at_plan_s) {
             self.lacking.stalled = HeadSet::default();
         }
@@ -213,7 +212,7 @@ impl Driving {
     }
 }
 
-/// Largest steps along the wall between two neighbouring beams, m, by class of waiting time.
+/// Largest steps along the wall between two neighbouring beams, m, by class of the wait until the next pass.
 ///
 /// The beams come from `place_m` and are `step_rad` apart. The head sweeps `sectors` sectors. Without sectors
 /// all classes equal the first.

@@ -109,7 +109,8 @@ fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel
 
 /// Angle beside the occluded angles at which the vehicle may also return echoes, radians.
 const BESIDE_RAD: f64 = 0.09;
-/// Share of the range to the wall. A return from a shorter range at an occluded angle is from the vehicle.
+/// A return at an occluded angle is from the vehicle if its range is below this share of the range to the
+/// wall.
 const VEHICLE_SHARE: f64 = 0.5;
 
 fn outcome(

@@ -84,7 +84,8 @@ pub(crate) fn judge_one(
 
 /// Records changed runs for the list of alerts.
 ///
-/// Cleared runs come last, so that the list already knows the runs that remain of them: these keep the alert.
+/// Cleared runs come last. The alert of a cleared run passes to the runs that remain of it, so the list must
+/// have these runs first.
 fn note_runs(notices: &[Notice], place: (usize, bool), sections: &Sections, runs: &mut RunInputs) {
     for cleared in [false, true] {
         for notice in notices {
@@ -166,7 +167,8 @@ mod tests {
         }
     }
 
-    /// The alert of a cleared run passes to the runs that remain of it, so the list must know these first.
+    /// The alert of a cleared run passes to the runs that remain of it, so the list must have these runs
+    /// first.
     #[test]
     fn cleared_runs_come_last_and_runs_without_room_are_dropped() {
         let mut coverage = coverage();

@@ -63,8 +63,8 @@ impl Turning {
     /// The time of the ping gives the random number.
     fn would_lose(&mut self, when: MonoNs, rate: LossRate) -> bool {
         let LossRate { share, after_lost } = rate;
-        // The rate after a return is unknown if all pings were lost, or if a loss was always followed by
-        // another.
+        // The loss rate after a return is unknown if all pings were lost, or if every loss was followed by
+        // another loss.
         let is_known = share < 1.0 && after_lost < 1.0;
         let after_heard = if is_known { share * (1.0 - after_lost) / (1.0 - share) } else { share };
         let chance = if self.would_lose { after_lost } else { after_heard };
@@ -85,8 +85,8 @@ struct Away {
     at: MonoNs,
     head: u8,
     angle_rad: f64,
-    /// Causes other than the missing position. For a ping without a return, the aim decides on further
-    /// causes.
+    /// Causes other than the missing position. A ping without a return gets further causes once the point is
+    /// known at which its beam meets the design.
     why: Causes,
     is_lost: bool,
 }
@@ -102,7 +102,7 @@ pub(crate) struct MissingSampleFinder {
     forgot: bool,
     /// Heads that have stalled and have not been in phase since.
     pub(super) stalled: HeadSet,
-    /// Deaf heads, as of the last update.
+    /// Deaf heads as of the last update: heads that turn and ping without detecting the wall.
     deaf: HeadSet,
 }
 
@@ -171,7 +171,7 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
         Outcome::Sample { .. } => head.note_hidden(ping.hidden == Hidden::Yes, false),
         Outcome::Lost(loss, Some(Aim { x_m, arc_m })) => {
             head.note_hidden(loss == Loss::Occluded, true);
-            // If such angles do return the wall, a lost ping there is a missing return.
+            // If other pings at such angles detect the wall, a lost ping there is a missing return.
             let heard = loss == Loss::Occluded && !head.is_hidden();
             let cause = match loss {
                 Loss::Missing if deaf.has(ping.head) => Cause::HeadSilent,
@@ -199,7 +199,7 @@ pub(super) fn number_of(head: usize) -> u8 {
     u8::try_from(head).unwrap_or(u8::MAX)
 }
 
-/// Records the deaf heads. Their losses in the last turn are not random.
+/// Records the heads that ping without detecting the wall. Their losses in the last turn are not random.
 fn note_deaf(lacking: &mut MissingSampleFinder, deaf: HeadSet, coverage: &mut Coverage) {
     let before = core::mem::replace(&mut lacking.deaf, deaf);
     for head in deaf.iter().filter(|head| !before.has(*head)) {
@@ -398,7 +398,7 @@ impl Placing<'_> {
         // causes.
         let made = why == Causes::of(Cause::PositionLost);
         if ping.is_lost {
-            // A ping that the head would not have detected anyway is not lost by chance.
+            // At wall that the head could not have detected anyway, a ping is not lost by chance.
             let elsewhere = |why: Causes| why.without(Cause::MissingReturns);
             let is_far = wall.range_m > self.turning.longest_m;
             let is_hidden = self.turning.is_hidden() && (self.hidden)(ping.angle_rad);

@@ -300,7 +300,7 @@ mod tests {
         heard(5.1, 1.0 + STEP_RAD * f64::from(number), range_m)
     }
 
-    /// An isolated echo from before the wall waits for the next return. Then it counts as missing, for holes
+    /// An isolated echo in front of the wall waits for the next return. Then it counts as missing, for holes
     /// and for causes.
     #[test]
     fn isolated_echo_is_a_missing_sample_at_its_aim() {
@@ -331,7 +331,7 @@ mod tests {
         assert_eq!(found[0], (1, 0), "the first return waits");
         assert_eq!(found.last(), Some(&(20, 0)), "{found:?}");
         assert!(bench.lacks().is_empty() && bench.sweep.waiting.last_mut().is_none());
-        // All are single steps, and a pass crosses each of them.
+        // All samples are one step apart, so a pass crosses each of them.
         let crossed = |number: f64| {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
                 panic!()

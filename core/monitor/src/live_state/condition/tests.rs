@@ -14,7 +14,7 @@ fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
     Advice { reason, v_max_mps, predicted_t_m: Some(t_m), will_exceed: t_m > 0.5, ..none }
 }
 
-/// Two heads and another sensor, all last heard at 10 s. The speed and its limit are 0.07 m/s.
+/// Two heads and another sensor. Their last readings came at 10 s. The speed and its limit are 0.07 m/s.
 pub(crate) fn state() -> LiveState {
     let mut heard = LiveState::new(0.5, 2.0, 0b11, 3).heard;
     heard[..3].fill(Some(at(10)));
@@ -66,8 +66,8 @@ fn any_speed_is_fine_over_passed_wall() {
     assert_eq!(mute.condition(), Condition::NoSonar);
 }
 
-/// The vehicle passes a missed stretch again from the turning point on. Its way back gives coverage, too, if
-/// it is slow enough.
+/// The vehicle passes a missed stretch again from the turning point on. It also covers wall on its way back,
+/// if it is slow enough.
 #[test]
 fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
     let back = LiveState { back_to_m: Some(8.2), speed_mps: Some(-0.3), ..state() };

@@ -250,8 +250,8 @@ fn silent_head_is_missing_at_its_extrapolated_angles() {
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadStalled]));
 }
 
-/// Pings without a fix have this as an additional cause. They are placed along the track as soon as there is
-/// a fix again.
+/// Pings without a fix have the missing position as an additional cause. They are placed along the track as
+/// soon as there is a fix again.
 #[test]
 fn simulated_pings_without_a_fix_are_placed_later() {
     let mut dive = Dive::new();
@@ -261,7 +261,7 @@ fn simulated_pings_without_a_fix_are_placed_later() {
     assert_eq!((all.len(), dive.lacking.away.len(), dive.lacking.forgot), (100, 0, false));
     assert!(dive.are_pings_after_10_s(&all[..50], &[Cause::HeadSilent, Cause::PositionLost]), "{all:?}");
     assert!(all[50..].iter().all(|lack| lack.why == Causes::of(Cause::HeadSilent)));
-    // Their speed is the mean speed between the two fixes.
+    // Their driving figures have the mean speed between the two fixes.
     let section = dive.coverage.sections.get(8).unwrap();
     assert!((section.passage.drive.speed_mps - 0.1).abs() < 1e-9, "{:?}", section.passage.drive);
     // If the capacity is exceeded, the first pings are kept.
