@@ -80,7 +80,7 @@ pub enum RoutingError {
 
 /// Returns the sensors that receive lines: those of the vehicle file, or those in `explicit`.
 ///
-/// `explicit` has pairs of a sensor's id and its line, which override the vehicle file's.
+/// `explicit` has pairs of a sensor's id and its line, which replace the lines in the vehicle file.
 ///
 /// Errors: see [`RoutingError`].
 pub fn takers(

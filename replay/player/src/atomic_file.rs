@@ -16,7 +16,7 @@ const READER_TRIES: u32 = 100;
 #[derive(Debug)]
 pub struct AtomicFile {
     file: BufWriter<File>,
-    /// Destination, and where the file is until it is complete; `None` if it is written in place.
+    /// Path of the destination, and storage of the incomplete file; `None` if the destination is written in place.
     beside: Option<(PathBuf, Beside)>,
 }
 

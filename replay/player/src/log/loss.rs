@@ -319,7 +319,7 @@ impl Losses {
         self.0.len() >= MAX_LOSSES
     }
 
-    /// Adds a range to the loss of the same kind. Each of these kinds has only one entry in the list.
+    /// Adds a range to the loss of the same kind, or adds a loss if the list has none of this kind.
     pub(super) fn extend(&mut self, kind: LossKind, offset: u64, bytes: u64) {
         if let Some(known) = self.0.iter_mut().rev().find(|loss| loss.kind == kind) {
             known.bytes = known.bytes.saturating_add(bytes);

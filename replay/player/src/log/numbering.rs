@@ -57,8 +57,8 @@ enum Fault {
 struct Break {
     fault: Fault,
     messages: u64,
-    /// The break lies before one of these pieces: first and last. The number of all pieces stands for the end of the
-    /// log.
+    /// First and last piece of a range. The break lies before one of these pieces. The number after the last piece
+    /// stands for the end of the log.
     pieces: (usize, usize),
 }
 
@@ -211,8 +211,8 @@ impl Count {
         }
     }
 
-    /// Whether a run that ends in piece `from` may continue in piece `to`: not earlier, and with no other run
-    /// between.
+    /// Whether a run that ends in piece `from` may continue in piece `to`. Piece `to` must not be earlier, and no other
+    /// run may lie between the two.
     fn is_clear(&self, from: usize, to: usize) -> bool {
         from <= to && !self.runs.iter().any(|run| from < run.pieces.1 && run.pieces.0 <= to)
     }

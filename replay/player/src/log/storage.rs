@@ -73,7 +73,7 @@ impl Storage for Disk {
     }
 }
 
-/// Change by another program to a recording's file. Its content is then gone, or no longer at its path.
+/// Change by another program to a recording's file. The file's content is then gone, or no longer at its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Taken {
     #[error("another program has deleted the file")]
@@ -85,7 +85,7 @@ pub(super) enum Taken {
 }
 
 impl Taken {
-    /// Whether an error was caused by such a change.
+    /// Whether an error reports a change by another program to the file.
     pub(super) fn is_in(error: &io::Error) -> bool {
         error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<Self>)
     }
@@ -93,7 +93,7 @@ impl Taken {
 
 /// A file on the disk, which other programs may delete, truncate or replace.
 ///
-/// If another program moves it, writing continues in the moved file, and nothing is lost.
+/// If another program moves the file, writing continues in the moved file, and nothing is lost.
 struct DiskFile {
     file: File,
     path: PathBuf,

@@ -207,7 +207,7 @@ impl Described {
             let place_m = [murk.stretch.from_m, murk.stretch.to_m];
             let by = format!("murk of {} g/l from {} to {} m", murk.silt_gpl, place_m[0], place_m[1]);
             let call = |effect, keys: &[_]| Call::new(effect, by.clone(), keys).within(place_m);
-            // Values from field.md, "murk": runs of lost returns, 5 % near returns, second echoes.
+            // Values from docs/why/field.md, "murk": runs of lost returns, 5 % near returns, second echoes.
             let lost = [("share", number(0.2)), ("mean_run", number(6.0))];
             let near = [("share", number(0.05)), ("mean_run", number(3.0))];
             let silt = [("silt_gpl", number(murk.silt_gpl)), ("grain_um", number(murk.grain_um))];
