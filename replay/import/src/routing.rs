@@ -78,7 +78,7 @@ pub enum RoutingError {
     },
 }
 
-/// Returns the sensors that receive lines: those of the vehicle file, or those in `explicit`.
+/// Returns the sensors that receive lines: the sensors of the vehicle file, or the sensors in `explicit`.
 ///
 /// `explicit` has pairs of a sensor's id and its line, which replace the lines in the vehicle file.
 ///

@@ -2,7 +2,9 @@
 //!
 //! The same dives are simulated with and without the effect, seed by seed. Each effect draws its own random numbers, so
 //! the two dives of a seed differ only by the effect. The mean difference over the seeds has a 95 % confidence interval
-//! by Student's t. // D is the diameter of a section's hole: the largest circle on its wall without samples.
+//! by Student's t.
+//!
+//! D is the diameter of a section's hole: the largest circle on its wall without samples.
 
 mod error;
 mod figures;

@@ -74,7 +74,7 @@ pub enum LossKind {
         /// Number of messages delivered too late.
         messages: u64,
     },
-    /// A record in a chunk that isn't allowed in chunks, such as another chunk.
+    /// A record of a kind that isn't allowed in chunks, such as a chunk within a chunk.
     Misplaced,
     /// Messages of a channel whose definition is missing from the log.
     UnknownChannel {

@@ -152,7 +152,8 @@ impl Break {
         self.fault == other.fault && first <= last
     }
 
-    /// Merges the break of another channel, and narrows the place. A channel with few messages leaves a wide gap.
+    /// Merges the break of another channel, and narrows the range of pieces. A channel with few messages has a wide
+    /// range.
     fn add(&mut self, other: &Self) {
         self.messages += other.messages;
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
@@ -198,7 +199,7 @@ impl Count {
             return;
         };
         (run.last, run.pieces.1) = (number, piece);
-        // Pieces may be read in another order than that of the file, so this number may close a gap between two runs.
+        // Pieces may be read in an order other than the file's, so this number may close a gap between two runs.
         let after = self.runs.iter().position(|run| run.first == number + 1 && piece < run.pieces.0);
         let after =
             after.filter(|at| self.runs.get(*at).is_some_and(|run| self.is_clear(piece, run.pieces.0 - 1)));

@@ -10,12 +10,12 @@ use crate::atomic_file::{folder_of, number_of};
 pub trait Storage: Send {
     /// Creates a file. Once this function returns, the file's name survives a power cut.
     ///
-    /// Errors: the file exists already; those of the system.
+    /// Errors: the file exists already; system errors.
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>>;
 
     /// Removes a file.
     ///
-    /// Errors: the file doesn't exist; those of the system.
+    /// Errors: the file doesn't exist; system errors.
     fn remove(&mut self, path: &Path) -> io::Result<()>;
 
     /// Free bytes on the file's medium; `None` if unknown.
@@ -26,7 +26,7 @@ pub trait Storage: Send {
 pub trait StoredFile: Send {
     /// Appends the first of these bytes, as many as possible, and returns their number.
     ///
-    /// Errors: those of the system; the caller retries after `Interrupted`.
+    /// Errors: a system error; after `Interrupted` the caller tries again.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
     /// Syncs the file. Once this function returns, everything written so far survives a power cut.
@@ -34,7 +34,7 @@ pub trait StoredFile: Send {
     /// After an error, nothing written since the last success is certain. If another program has changed the file,
     /// nothing in it is certain.
     ///
-    /// Errors: those of the system; another program has deleted, truncated or replaced the file.
+    /// Errors: a system error; another program has deleted, truncated or replaced the file.
     fn sync(&mut self) -> io::Result<()>;
 }
 

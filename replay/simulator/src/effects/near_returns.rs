@@ -156,8 +156,8 @@ mod tests {
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         assert!((pings / whole - share).abs() < 5.0 * math::sqrt(variance), "{}", pings / whole);
 
-        // Within a run, the variance is that of the spread. The variance of the runs' means is that of evenly
-        // distributed ranges, and a little more.
+        // Within a run, the variance is the square of the spread. The means of the runs vary slightly more than evenly
+        // distributed ranges.
         let long: Vec<&Vec<f64>> = runs.iter().filter(|run| run.len() > 1).collect();
         let (mut within, mut freedom, mut means) = (0.0, 0.0, Vec::new());
         for run in &long {
