@@ -12,7 +12,8 @@ use super::polyline::{self, Px};
 
 /// Default width and height of a sheet, pixels.
 pub const SIZE_PX: [u32; 2] = [900, 560];
-/// Mean letter width, plain and bold, as a share of the font size. Slightly overestimated for common fonts.
+/// Mean letter width of plain and of bold text, as a share of the font size. Both are slightly too large for common
+/// fonts.
 const LETTER: [f64; 2] = [0.56, 0.65];
 
 /// Horizontal alignment of a text at its position.
@@ -173,7 +174,8 @@ impl Canvas {
         self.put(node);
     }
 
-    /// Draws rectangles of one colour as a single SVG element. Each is an upper left corner with width and height.
+    /// Draws rectangles of one colour as a single SVG element. Each rectangle is given by its upper left corner, width
+    /// and height.
     pub fn areas(&self, areas: &[(Px, Px)], colour: Colour) {
         let area = |([left, top], [width, height]): &(Px, Px)| {
             let [width, height] = [width, height].map(|px| number(*px));
@@ -182,7 +184,7 @@ impl Canvas {
         let node = element::Path::new()
             .set("d", areas.iter().map(area).collect::<String>())
             .set("fill", hex(colour))
-            // Anti-aliasing would show the sheet between adjacent rectangles.
+            // Crisp edges turn off anti-aliasing, which would show the sheet between adjacent rectangles.
             .set("shape-rendering", "crispEdges");
         self.put(node);
     }

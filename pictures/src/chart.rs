@@ -23,7 +23,7 @@ struct Scale {
 }
 
 impl Scale {
-    /// Position of a value: 0 at the beginning, 1 at the end.
+    /// Position of a value on the axis: 0 at the beginning, 1 at the end.
     fn share(&self, value: f64) -> f64 {
         if self.logarithmic {
             math::ln(value / self.from) / math::ln(self.to / self.from)
@@ -57,7 +57,8 @@ impl Axis {
 
     /// A logarithmic axis with at most `most_ticks` ticks; both ends must be above zero.
     ///
-    /// Ticks are powers of ten, with 2 and 5 (or 3) between them if they fit. A short axis gets linear ticks instead.
+    /// Ticks are powers of ten. If they fit, 2 and 5 times each power, or only 3 times each power, are ticks too. A
+    /// short axis gets linear ticks instead.
     pub fn logarithmic(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
         let scale = Scale { from, to, logarithmic: true };
         if to / from < SHORT {
@@ -102,7 +103,8 @@ fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
     ((0..=most).map(tick).filter(|tick| *tick <= to + 1e-9 * step).collect(), digits)
 }
 
-/// Returns powers of ten within a range. Adds 2 and 5, or only 3, between them if the total is at most `most`.
+/// Returns powers of ten within a range. If they fit into `most` ticks, also returns 2 and 5 times each power, or only
+/// 3 times each power. If the powers alone don't fit, returns only some of them.
 fn log_ticks(from: f64, to: f64, most: u32) -> Vec<f64> {
     let within = |factors: &[f64]| -> Vec<f64> {
         let decades =

@@ -25,7 +25,7 @@ impl Hour {
     }
 }
 
-/// Returns a position for every hour and a half, from floor to floor.
+/// Returns a position for every hour and a half, once around the perimeter from floor to floor.
 ///
 /// The clock is centred on the profile's reference point and read while looking along the tunnel.
 pub fn hours(profile: &Profile) -> Vec<Hour> {
@@ -44,7 +44,8 @@ pub fn hours(profile: &Profile) -> Vec<Hour> {
     let hour = |(k, (clock, place)): (u32, (&str, &'static str))| {
         let (sine, cosine) = math::sin_cos(math::TAU * f64::from(k) / 8.0);
         let arc_m = match k {
-            // The first and last positions are both at the seam, where rounding could put either at the wrong end.
+            // The first and last positions are both at the seam. Rounding could put either at the wrong end of the
+            // perimeter.
             0 => 0.0,
             8 => profile.perimeter_m(),
             _ => profile.arc_of([y_m + sine, z_m - cosine]),

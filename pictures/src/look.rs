@@ -18,7 +18,7 @@ pub enum Marker {
     Square,
     /// A triangle with its tip up.
     Triangle,
-    /// A square on its corner.
+    /// A square that stands on a corner.
     Diamond,
     /// A triangle with its tip down.
     Down,
@@ -71,15 +71,15 @@ pub fn of_several(number: usize) -> Look {
     SEVERAL.get(number % SEVERAL.len()).copied().unwrap_or(T)
 }
 
-/// Look of T, and of curves that represent T.
+/// Look of T, the diagonal of the lattice of samples.
 pub const T: Look = look(BLACK, &[], Marker::Circle);
 /// Look of T_x, the spacing between passes.
 pub const T_X: Look = look(BLUE, &[10.0, 4.0], Marker::Square);
 /// Look of T_y, the spacing between neighbouring returns of a turn.
 pub const T_Y: Look = look(VERMILION, &[3.0, 3.0], Marker::Triangle);
-/// Look of the target.
+/// Look of the target, which is the largest hole that may pass.
 pub const TARGET: Look = Look { width_px: 1.6, ..look(DIM, &[6.0, 5.0], Marker::Circle) };
-/// Look of the requested value.
+/// Look of the value that the user requested.
 pub const ASKED: Look = Look { width_px: 1.4, ..look(DIM, &[2.0, 4.0], Marker::Circle) };
 /// Look of parts that the vehicle occludes.
 pub const HIDDEN: Look = Look { width_px: 1.2, ..look(PALE, &[1.5, 3.5], Marker::Circle) };
@@ -87,5 +87,5 @@ pub const HIDDEN: Look = Look { width_px: 1.2, ..look(PALE, &[1.5, 3.5], Marker:
 pub const GRID: Look = Look { width_px: 0.8, ..look(Colour(228, 228, 228), &[], Marker::Circle) };
 /// Look of axes.
 pub const AXIS: Look = Look { width_px: 1.0, ..look(DIM, &[], Marker::Circle) };
-/// Look of the line that connects a label with its item.
+/// Look of the line that connects a label with the curve or marker that it names.
 pub const LEADER: Look = Look { width_px: 0.8, ..look(PALE, &[], Marker::Circle) };

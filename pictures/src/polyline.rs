@@ -2,7 +2,7 @@
 
 use headrace_geometry::math;
 
-/// A position on the sheet, pixels: to the right, and down.
+/// A position on the sheet: pixels to the right, and pixels down.
 pub type Px = [f64; 2];
 
 /// Maximum distance between a line and its simplified form, pixels.
@@ -56,7 +56,7 @@ impl Frame {
             }
         }
         let along = |share: f64| [from[0] + share * dx, from[1] + share * dy];
-        // An unclipped end stays identical to the bit, so that adjacent pieces can be joined.
+        // An end that isn't clipped stays bit-identical, so that adjacent pieces can be joined.
         let begin = if first > 0.0 { along(first) } else { from };
         let end = if last < 1.0 { along(last) } else { to };
         (first <= last).then_some([begin, end])
@@ -68,9 +68,9 @@ impl Frame {
     }
 }
 
-/// Returns a step on an unrolled wall as line segments. Positions are (x, arc length), m.
+/// Connects two positions on an unrolled wall by line segments. Positions are (x, arc length), m.
 ///
-/// The step is one segment or, if the shorter path crosses the seam, two segments that end at the seam.
+/// The connection is one segment or, if the shorter path crosses the seam, two segments that end at the seam.
 pub fn over_seam(perimeter_m: f64, from: [f64; 2], to: [f64; 2]) -> Vec<[[f64; 2]; 2]> {
     let around_m = math::wrap_signed(to[1] - from[1], perimeter_m);
     if (to[1] - from[1] - around_m).abs() < 1e-9 {

@@ -105,9 +105,9 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     Ok(frame)
 }
 
-/// Parses pairs of digits, which points may separate.
+/// Parses pairs of hexadecimal digits. Dots between the digits are ignored.
 ///
-/// `_E` after eight pairs is the raw length, which is ignored.
+/// A suffix such as `_E` states the raw length of the frame, and is ignored too.
 fn data_bytes(text: &str, data: &mut [u8; 8]) -> Result<u8, &'static str> {
     let text = text.split_once('_').map_or(text, |(data, _)| data);
     let digits: Vec<u8> = text.bytes().filter(|byte| *byte != b'.').collect();

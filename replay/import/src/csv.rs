@@ -148,7 +148,7 @@ impl Format for Csv {
             return Step::Took(used);
         }
         if !is_ended {
-            // A truncated number would parse as another number.
+            // The last number may be truncated. It would then parse as another number.
             return Step::Lost(used, "a last row without a line end: it may be cut short, and is skipped");
         }
         let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that aren't UTF-8 text") };
@@ -218,7 +218,7 @@ impl Target {
     }
 }
 
-/// Builds a value from its parts; `None` if a part is missing.
+/// Builds a value from its parts; `None` if a part is missing from the row.
 ///
 /// A head with an angle and no range had no echo.
 fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<Value> {

@@ -10,7 +10,7 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, So
 use headrace_sensor::reading::Level;
 use headrace_vehicle::VehicleConfig;
 
-/// Sample period stated in inertial samples, because foreign values have none.
+/// Sample period that inertial samples state. The foreign values don't state theirs.
 const PERIOD: DurNs = DurNs(10_000_000);
 
 /// A value for an emulator.
@@ -50,7 +50,7 @@ impl Value {
     }
 }
 
-/// Reason for ranges beyond a head's range setting.
+/// Remark about ranges outside a head's range setting.
 pub(super) const BEYOND: &str = "ranges outside the head's range setting, imported as pings without an echo";
 
 /// A sensor of the vehicle file.

@@ -20,7 +20,7 @@ pub enum Step {
     Lost(usize, &'static str),
     /// More bytes are needed. At the end of the file, this means that the last entry is truncated.
     More,
-    /// The same bytes have further entries, so none of them is consumed yet.
+    /// The same bytes hold further entries, so none of the bytes are consumed yet.
     Held,
 }
 

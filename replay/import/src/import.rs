@@ -15,7 +15,7 @@ use crate::losses::Losses;
 use crate::order::Order;
 use crate::taker::Taker;
 
-/// Log time of a file's first entry, the same as in a simulation.
+/// Log time of a file's first entry. A simulated dive begins at the same log time.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
 /// Longest plausible gap between timestamps. A longer gap means that the clock was set, or the file has several

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::Entry;
 
-/// Time for which entries are held back, since older ones may follow: those within this time of the latest.
+/// Entries within this time of the latest timestamp are held back, because older entries may still follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;
 /// Maximum number of entries held back, whatever their timestamps.
 const MOST_ENTRIES: usize = 1 << 15;

@@ -1,7 +1,7 @@
 //! Logs of Ping Viewer: a preface, then messages, each after its time of day.
 //!
-//! Source: Ping Viewer, docs, "Binary log file structure". Numbers are big-endian. A text is its length in bytes,
-//! u32, and UTF-16.
+//! Source: Ping Viewer, docs, "Binary log file structure". Numbers are big-endian. A text is stored as its length in
+//! bytes, a u32, followed by UTF-16.
 
 use crate::{Clock, Entry, Format, Step};
 

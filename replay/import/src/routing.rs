@@ -78,9 +78,9 @@ pub enum RoutingError {
     },
 }
 
-/// Returns the sensors that receive lines: those of the vehicle file, or those in `explicit`.
+/// Returns the sensors that receive lines: the sensors of the vehicle file, or the sensors in `explicit`.
 ///
-/// `explicit` has pairs of a sensor's id and its line, which override the vehicle file's.
+/// `explicit` has pairs of a sensor's id and its line, which replace the lines in the vehicle file.
 ///
 /// Errors: see [`RoutingError`].
 pub fn takers(

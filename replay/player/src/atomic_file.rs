@@ -16,7 +16,7 @@ const READER_TRIES: u32 = 100;
 #[derive(Debug)]
 pub struct AtomicFile {
     file: BufWriter<File>,
-    /// Destination, and where the file is until it is complete; `None` if it is written in place.
+    /// Path of the destination, and storage of the incomplete file; `None` if the destination is written in place.
     beside: Option<(PathBuf, Beside)>,
 }
 
@@ -35,7 +35,7 @@ impl AtomicFile {
     /// Pipes, terminals and devices can't be replaced, nor can files in a folder that accepts no new file. All these
     /// are written in place.
     ///
-    /// Errors: those of the system.
+    /// Errors: system errors.
     pub fn create(path: &Path) -> Result<Self> {
         let there = std::fs::metadata(path);
         if there.as_ref().is_ok_and(|there| !there.is_file()) {
@@ -61,7 +61,7 @@ impl AtomicFile {
 
     /// Moves the file to its destination. Once this function returns, the file survives a power cut.
     ///
-    /// Errors: those of the system; the previous file is then unchanged.
+    /// Errors: a system error, after which the previous file is unchanged.
     pub fn complete(mut self) -> Result<()> {
         self.file.flush()?;
         let Some((place, beside)) = &mut self.beside else { return Ok(()) };
@@ -87,7 +87,7 @@ impl AtomicFile {
 
 /// Writes a file atomically.
 ///
-/// Errors: those of the system; the previous file is then unchanged.
+/// Errors: a system error, after which the previous file is unchanged.
 pub fn write(path: &Path, content: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     file.write_all(content)?;
@@ -134,7 +134,7 @@ pub fn is_pipe(_: &Path) -> bool {
 
 /// Opens a named pipe for writing, once a process reads it.
 ///
-/// Errors: those of the system; no process reads the pipe within [`READER_WITHIN`].
+/// Errors: a system error; no process reads the pipe within [`READER_WITHIN`].
 #[cfg(unix)]
 fn open_pipe(path: &Path) -> Result<File> {
     use rustix::fs::{Mode, OFlags, fcntl_setfl, open};

@@ -1,8 +1,10 @@
 //! Measures two quantities for each effect of a scene: its computing cost, and its influence on the loop's results.
 //!
-//! The same dives are simulated with and without the effect, seed by seed. Each effect draws its own random numbers,
-//! so the two dives of a seed differ only by the effect. The mean difference over the seeds has a 95 % confidence
-//! interval by Student's t.
+//! The same dives are simulated with and without the effect, seed by seed. Each effect draws its own random numbers, so
+//! the two dives of a seed differ only by the effect. The mean difference over the seeds has a 95 % confidence interval
+//! by Student's t.
+//!
+//! D is the diameter of a section's hole: the largest circle on its wall without samples.
 
 mod error;
 mod figures;
@@ -15,19 +17,20 @@ pub use error::EffectInfluenceError;
 use figures::Figures;
 pub use mean::Mean;
 
-/// Maximum change of D, m, that counts as negligible. The whole confidence interval must be within it.
+/// Maximum change of D, m, that counts as negligible. The whole confidence interval of the change must be within this
+/// limit.
 pub const HOLE_LIMIT_M: f64 = 0.01;
 /// Maximum change of the passed length that counts as negligible, as a share of the coverage extent.
 pub const PASSED_LIMIT: f64 = 0.01;
 
-/// Result of leaving effects out of a scene.
+/// Cost of some effects of a scene, and change of the results if these effects are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
     /// Names of the effects left out.
     pub effects: Vec<&'static str>,
     /// Cost of these effects, ns of processor time per sonar return.
     pub price_ns: Mean,
-    /// Change of D if the effects are left out, mean over the sections, m.
+    /// Mean change of D over the sections if the effects are left out, m.
     pub hole_m: Mean,
     /// Change of the passed length if the effects are left out, as a share of the coverage extent.
     pub passed: Mean,
@@ -42,7 +45,7 @@ pub struct EffectInfluence {
     pub way_m: f64,
     /// Passed length with all effects, as a share of the coverage extent.
     pub passed: Mean,
-    /// D with all effects, mean over the sections, m.
+    /// Mean of D over the sections with all effects, m.
     pub hole_m: Mean,
     /// Cost of simulating with all effects, ns of processor time per sonar return.
     pub all_ns: Mean,

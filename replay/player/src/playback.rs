@@ -57,10 +57,11 @@ pub trait PlaybackObserver {
     /// Called after each tick that is played.
     fn after_tick(&mut self, dive: &Loop);
 
-    /// Called after each tick that a jump skips. Its notices must not be displayed.
+    /// Called after each tick that a jump skips. Notices of such a tick must not be displayed.
     fn after_skipped_tick(&mut self, dive: &Loop);
 
-    /// Called when playback pauses, after a jump, and at the end of the log, then with `ended`.
+    /// Called when playback pauses, after a jump, and at the end of the log. Only at the end of the log, `ended` is
+    /// true.
     ///
     /// `at` is the end of the last tick.
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool);
@@ -166,7 +167,8 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Waits until the next tick is due or, if paused, for a command. Returns a command that arrives before.
+    /// Waits until the next tick is due or, if paused, for a command. Returns a command that arrives before the tick is
+    /// due.
     fn wait(&mut self, until: MonoNs, commands: &Receiver<PlaybackCommand>) -> Option<PlaybackCommand> {
         match self.mode {
             Mode::Paused => {
@@ -178,7 +180,8 @@ impl<'a> Playback<'a> {
                 command
             }
             Mode::Stepping(_) => None,
-            // The next judged section may be far away, so a command may arrive before. It is checked without waiting.
+            // The next judged section may be far away, so commands must be able to interrupt. The check for a command
+            // doesn't wait.
             Mode::SteppingSection => commands.try_recv().ok(),
             Mode::Playing => match self.clock.left(until) {
                 None => commands.try_recv().ok(),
@@ -241,7 +244,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Restores the snapshot of a time that the store has returned.
+    /// Restores the snapshot of time `at`, which the store has returned as the time of a snapshot.
     fn restore(&mut self, at: MonoNs) -> Result<(), PlaybackError> {
         let Some(snapshot) = self.store.load(at) else { return Ok(()) };
         let mut restorer = Restorer::new(&snapshot);

@@ -20,11 +20,11 @@ use crate::view;
 /// sources.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
-/// Divisor of the queue's free room that gives the limit for a tick in a dive on ports.
+/// A tick may consume at most the free room of the queue divided by this number, in a dive that reads ports.
 ///
 /// Short packets, together with their results, take several times their length in the queue.
 const SMALLER_TICK: usize = 8;
-/// Minimum limit for a tick in a dive on ports, bytes. The longest packet of a port has some KiB.
+/// Minimum limit for a tick in a dive that reads ports, bytes. The longest packet of a port has some KiB.
 const MIN_TICK_BYTES: usize = 8 * 1024;
 
 /// Size of the buffer for one stream's results of a tick, bytes. Results beyond it are not recorded.
@@ -33,7 +33,7 @@ const MAX_RESULT_BYTES: usize = 1 << 19;
 /// Size of a recorder's queue, bytes.
 pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
 
-/// Size of a recorder's queue in a dive on ports, bytes.
+/// Size of a recorder's queue in a dive that reads ports, bytes.
 ///
 /// It holds some minutes of a vehicle with four heads while the medium accepts no data.
 pub const QUEUE_OF_PORTS_BYTES: usize = 16 * LARGEST_TICK_BYTES;
@@ -75,8 +75,8 @@ pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
 /// Packets are recorded in the order of consumption. If a recorder's queue has no room for another largest tick, the
 /// loop consumes nothing until there is room. Recorded input is therefore never dropped.
 ///
-/// A dive on ports doesn't wait, see [`RecorderOutlet::of_ports`]. If all recorders have ended, the dive continues
-/// without recording; their handles return the errors.
+/// A dive that reads ports doesn't wait, see [`RecorderOutlet::of_ports`]. If all recorders have ended, the dive
+/// continues without recording; their handles return the errors.
 pub struct RecorderOutlet {
     ports: Cell<Vec<RecorderPort>>,
     is_of_ports: bool,
@@ -90,9 +90,9 @@ impl RecorderOutlet {
         Self { ports: Cell::new(ports.into_iter().collect()), is_of_ports: false }
     }
 
-    /// Makes the outlet never wait for a recorder. For a dive on ports, where a blocked medium must not delay advice.
+    /// Makes the outlet never wait for a recorder. In a dive that reads ports, a blocked medium must not delay advice.
     ///
-    /// A recorder whose queue is full skips ticks. It reports that
+    /// A recorder whose queue is full skips ticks. It reports the skipping
     /// ([`RecordingEvent::Behind`](crate::log::RecordingEvent)), and states the skipped ticks in its log.
     #[must_use]
     pub fn of_ports(self) -> Self {
@@ -144,7 +144,7 @@ fn record(
         // A recorder that skips ticks resumes only with ample room, and not with each small tick that would fit.
         let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
         if count > 0 && port.vacant_bytes() < needed {
-            // This happens only in a dive on ports. In other dives the allowance has reserved the room.
+            // Ticks are skipped only in a dive that reads ports. In other dives the allowance has reserved the room.
             port.skip(time.now, count as u64);
             continue;
         }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// Opens a regular file for reading.
 ///
-/// Errors: those of the system; the path is a pipe, a device or a socket.
+/// Errors: a system error; the path is a pipe, a device or a socket.
 pub fn open(path: &Path) -> Result<File> {
     let kind = std::fs::metadata(path)?.file_type();
     if !kind.is_file() && !kind.is_dir() {

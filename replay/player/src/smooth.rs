@@ -107,7 +107,7 @@ impl FirstPass {
     }
 }
 
-/// Extent of smoothing, for the report.
+/// Number of smoothed estimates and of separately smoothed pieces, for the report.
 #[derive(Debug, Clone, Copy)]
 pub struct Changes {
     estimates: u64,

@@ -23,7 +23,7 @@ pub const MOST_THREADS: usize = 3;
 const BATCH_TICKS: usize = 32;
 /// Maximum number of batches that wait between two threads.
 const MOST_WAITING: usize = 4;
-/// Capacity of the queue of used batches: those of two queues, and those being processed.
+/// Capacity of the queue of used batches. It fits the batches of two queues, and the batches being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 
 /// A batch of ticks, with their placed pings and their advice.
@@ -56,8 +56,8 @@ impl Batch {
 
 /// Runs the loop until the source ends, as fast as possible, on up to `threads` threads including the caller's.
 ///
-/// `after_tick` is called on the caller's thread after every tick. The results equal those of [`drive`], which is
-/// used for one thread, and if a plugin adds systems to the placing of pings.
+/// `after_tick` is called on the caller's thread after every tick. The results equal those of [`drive`], which runs
+/// instead if `threads` is one, or if a plugin adds systems to the placing of pings.
 ///
 /// Errors: see [`DriveError`]. Packets fed before the error have been processed, unless a thread has panicked.
 pub fn drive_on(

@@ -130,8 +130,8 @@ impl Stream {
         }
     }
 
-    /// Adds the live results of a tick. If too many wait, the live dive published results that the replay doesn't
-    /// have.
+    /// Adds the live results of a tick. If too many results wait, the replay doesn't have them, which is reported as a
+    /// difference.
     fn wait(&mut self, batch: Batch, name: &'static str) {
         // After the first difference nothing more is compared.
         if self.difference.is_some() {

@@ -157,7 +157,7 @@ mod tests {
         line
     }
 
-    /// Time, source and byte of the released messages.
+    /// Time, source and byte of each released message.
     fn going(outbox: &mut Outbox) -> Vec<(u64, u16, u8)> {
         let mut gone = Vec::new();
         while outbox.has_next() {

@@ -147,7 +147,7 @@ impl Scene {
         self.trajectory.is_advised()
     }
 
-    /// Effects that the scene implies, with their fates.
+    /// Effects that the scene implies, each with whether and how it is simulated.
     pub fn called(&self) -> &[Called] {
         &self.called
     }

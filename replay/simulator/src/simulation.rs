@@ -36,7 +36,7 @@ const ECHOSOUNDER_REACH_M: f64 = 100.0;
 /// A time that is never reached.
 const NEVER: MonoNs = MonoNs(u64::MAX);
 
-/// Origin of the requests to the devices.
+/// Source of the requests to the devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Asker {
     /// Emulated hosts.

@@ -54,7 +54,8 @@ impl Stage {
     }
 }
 
-/// State of a head that aims from one pose for a whole turn: that pose, and the rotation since then.
+/// State of a head whose pings all start from the vehicle's pose at the start of the turn: that pose, and the rotation
+/// since then.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub(crate) struct Held {
     pose: Option<Pose>,
@@ -104,7 +105,8 @@ pub(crate) fn head_ray(pose: &Pose, mount: &Mount, angle_rad: f64) -> Ray {
 
 type Aimed<'a, Kind> = (&'a Samples<Sounding>, &'a Mounted, &'a mut Rays, Kind);
 
-/// Aims heads from the vehicle's pose at the start of each turn, as if a whole turn were measured at one instant.
+/// Aims all pings of a head's turn from the vehicle's pose at the start of the turn, as if the turn were measured at
+/// one instant.
 pub(crate) fn aim_held(
     scenery: Res<'_, Scenery>,
     mut heads: Query<'_, '_, Aimed<'_, &mut Held>, With<Head>>,
@@ -122,7 +124,7 @@ pub(crate) fn aim_held(
     }
 }
 
-/// Aims heads from the vehicle's pose at each ping.
+/// Aims each ping of a head from the vehicle's pose at the time of the ping.
 pub(crate) fn aim_moving(
     scenery: Res<'_, Scenery>,
     mut heads: Query<'_, '_, (&Samples<Sounding>, &Mounted, &mut Rays), With<Head>>,

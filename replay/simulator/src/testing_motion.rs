@@ -59,10 +59,10 @@ connect = "hid:1209:0001"
 counts_per_metre = 2000
 "#;
 
-/// A trajectory that goes forwards and then a little backwards, 35 s.
+/// A trajectory that leads forwards and then a little backwards; it lasts 35 s.
 pub(crate) const LEGS: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 6\nspeed_mps = 0.2\n\
                                [[trajectory.legs]]\ndistance_m = 1\nspeed_mps = -0.2\n";
-/// A single long leg, 640 s.
+/// A single leg that lasts 640 s.
 pub(crate) const LONG: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 64\nspeed_mps = 0.1\n";
 /// A pilot who goes to chainage 40 m.
 pub(crate) const PILOT: &str = "kind = \"pilot\"\nto_m = 40\nspeed_mps = 0.4\nstops_per_hour = 60\n\

@@ -1,6 +1,6 @@
 //! Bags of ROS 1.
 //!
-//! Source: ROS wiki, "Bags/Format/2.0". A record consists of a header and data, each after its length. A header
+//! Source: ROS wiki, "Bags/Format/2.0". A record consists of a header and data, each preceded by its length. A header
 //! consists of fields `name=value`. Messages are in chunks. Definitions of connections are in chunks and again at the
 //! end of the bag.
 
@@ -15,7 +15,7 @@ use crate::{Clock, Entry, Format, ImportError, ImportReport, Input, Source as _,
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Upper bound on the length of a header, bytes.
 const MOST_HEADER: usize = 1 << 16;
-/// Maximum number of bytes read of the definitions at the end of a bag.
+/// Maximum number of bytes read from the definitions at the end of a bag.
 const MOST_INDEX: u64 = 64 << 20;
 /// Timestamps before this one, in 2001, don't count as UTC.
 pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;

@@ -180,7 +180,7 @@ fn shown<'a>(topics: impl ExactSizeIterator<Item = &'a Topic>) -> String {
     }
     all.join(", ")
 }
-/// A noun with "a" or "an".
+/// Returns a noun with its article, "a" or "an".
 fn with_article(noun: &str) -> String {
     let article = if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
     format!("{article} {noun}")

@@ -61,7 +61,7 @@ pub(super) struct Told {
 impl Beams {
     /// Returns the valid beams, in the axes of a head.
     ///
-    /// Errors: the reason, as text, why the beams can't be those of a head.
+    /// Errors: the reason, as text, why no head can have measured the beams.
     pub(super) fn told(&self, plane: Plane) -> Result<Told, &'static str> {
         let mut told = Told::default();
         match self {

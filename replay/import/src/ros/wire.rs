@@ -6,9 +6,9 @@
 /// Serialisation of a recording's messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
-    /// That of ROS 1.
+    /// Serialisation of ROS 1.
     Ros1,
-    /// That of ROS 2: plain CDR, version 1.
+    /// Serialisation of ROS 2: plain CDR, version 1.
     Cdr,
 }
 

@@ -15,7 +15,7 @@ use crate::simulation_feed::SimulationFeed;
 /// Results of one dive.
 #[derive(Debug, Clone)]
 pub(super) struct Figures {
-    /// D of each section whose hole is bounded, m, by the section's start, mm.
+    /// Diameter D of the hole, m, of each section whose hole is bounded. The key is the start of the section, mm.
     holes_m: BTreeMap<i64, f64>,
     /// Length of the sections that the vehicle has passed, m.
     pub(super) way_m: f64,

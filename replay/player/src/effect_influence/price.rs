@@ -8,7 +8,7 @@ use super::error::EffectInfluenceError;
 use super::mean::Mean;
 use crate::adviser::{SimulationError, simulation};
 
-/// Number of rounds, each with and without the effects.
+/// Number of rounds. Each round simulates the scene once, and for a comparison once more without the effects.
 const ROUNDS: usize = 5;
 
 /// Returns the cost of simulating with all effects, ns of processor time per sonar return.

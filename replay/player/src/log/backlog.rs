@@ -1,4 +1,4 @@
-//! Messages that aren't synced yet. They were written since the last sync, or wait for a medium that can be written.
+//! Messages that aren't synced yet: written since the last sync, or waiting for a medium that can be written.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -80,7 +80,7 @@ impl Backlog {
 
     /// Calls `write` with each message, until it fails.
     ///
-    /// Errors: those of `write`.
+    /// Errors: an error of `write`.
     pub(super) fn try_each<E>(
         &mut self,
         mut write: impl FnMut(&Head, &[u8]) -> Result<(), E>,

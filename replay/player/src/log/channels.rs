@@ -107,7 +107,8 @@ impl Channels {
         &self.later
     }
 
-    /// Restores the channels of an earlier position, at which `later` had been found among the messages.
+    /// Restores the channels as known at an earlier position. `later` are the definitions found among the messages up
+    /// to there.
     pub(super) fn go_to(&mut self, later: &[Definition]) {
         let same = self.later.iter().zip(later).take_while(|(one, other)| one.id == other.id).count();
         for gone in self.later.drain(same..).rev() {
@@ -199,7 +200,7 @@ impl Channels {
             self.sources.push(SourceInfo { id, plugin: text(PLUGIN_KEY), connect: text(CONNECT_KEY) });
             self.sources.len() - 1
         });
-        // The index is below MAX_SOURCES, which fits.
+        // The index is below MAX_SOURCES, which fits into a u16.
         u16::try_from(number).unwrap_or(u16::MAX)
     }
 }

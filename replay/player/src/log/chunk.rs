@@ -75,7 +75,7 @@ pub(super) fn unpack<R: Read + Seek>(
     })
 }
 
-/// Whether the checksum matches that covers everything before the data end record.
+/// Whether the checksum of everything before the data end record matches.
 ///
 /// Also true if there is no checksum, or a record is too large to read.
 pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Result<bool, LogError> {

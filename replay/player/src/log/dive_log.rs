@@ -340,7 +340,7 @@ impl<R: Read + Seek> DiveLog<R> {
     fn in_part(&self, loss: &Loss) -> Option<Loss> {
         let mut loss = loss.clone();
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
-            // The next part states this loss.
+            // The next part states this loss, so it isn't reported here.
             if loss.kind == LossKind::Truncated && self.delivered == resumed.messages {
                 return None;
             }

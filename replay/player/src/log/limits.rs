@@ -52,7 +52,7 @@ pub(super) fn map_cost(entries: u64, bytes: u64) -> u64 {
     entries.saturating_mul(ENTRY_COST).saturating_add(bytes)
 }
 
-/// Share of [`MAX_HEADER_BYTES`] that is in use.
+/// Bytes in use out of [`MAX_HEADER_BYTES`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct HeaderBudget(u64);
 

@@ -74,7 +74,7 @@ pub enum LossKind {
         /// Number of messages delivered too late.
         messages: u64,
     },
-    /// A record in a chunk that isn't allowed in chunks, such as another chunk.
+    /// A record of a kind that isn't allowed in chunks, such as a chunk within a chunk.
     Misplaced,
     /// Messages of a channel whose definition is missing from the log.
     UnknownChannel {
@@ -319,7 +319,7 @@ impl Losses {
         self.0.len() >= MAX_LOSSES
     }
 
-    /// Adds a range to the loss of the same kind. Each of these kinds has only one entry in the list.
+    /// Adds a range to the loss of the same kind, or adds a loss if the list has none of this kind.
     pub(super) fn extend(&mut self, kind: LossKind, offset: u64, bytes: u64) {
         if let Some(known) = self.0.iter_mut().rev().find(|loss| loss.kind == kind) {
             known.bytes = known.bytes.saturating_add(bytes);

@@ -52,7 +52,8 @@ impl Batch {
     }
 }
 
-/// Sort key of a message: time, rank and sequence, or zeros for file order; then the position in the file.
+/// Sort key of a message: time, rank and sequence number, then position in the file. In file order the first three are
+/// zero.
 type Key = (u64, u32, u32, usize, usize);
 
 /// Pieces in memory, whose messages are being merged.

@@ -57,8 +57,8 @@ enum Fault {
 struct Break {
     fault: Fault,
     messages: u64,
-    /// The break lies before one of these pieces: first and last. The number of all pieces stands for the end of the
-    /// log.
+    /// First and last piece of a range. The break lies before one of these pieces. The number after the last piece
+    /// stands for the end of the log.
     pieces: (usize, usize),
 }
 
@@ -152,7 +152,8 @@ impl Break {
         self.fault == other.fault && first <= last
     }
 
-    /// Merges the break of another channel, and narrows the place. A channel with few messages leaves a wide gap.
+    /// Merges the break of another channel, and narrows the range of pieces. A channel with few messages has a wide
+    /// range.
     fn add(&mut self, other: &Self) {
         self.messages += other.messages;
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
@@ -198,7 +199,7 @@ impl Count {
             return;
         };
         (run.last, run.pieces.1) = (number, piece);
-        // Pieces may be read in another order than that of the file, so this number may close a gap between two runs.
+        // Pieces may be read in an order other than the file's, so this number may close a gap between two runs.
         let after = self.runs.iter().position(|run| run.first == number + 1 && piece < run.pieces.0);
         let after =
             after.filter(|at| self.runs.get(*at).is_some_and(|run| self.is_clear(piece, run.pieces.0 - 1)));
@@ -211,8 +212,8 @@ impl Count {
         }
     }
 
-    /// Whether a run that ends in piece `from` may continue in piece `to`: not earlier, and with no other run
-    /// between.
+    /// Whether a run that ends in piece `from` may continue in piece `to`. Piece `to` must not be earlier, and no other
+    /// run may lie between the two.
     fn is_clear(&self, from: usize, to: usize) -> bool {
         from <= to && !self.runs.iter().any(|run| from < run.pieces.1 && run.pieces.0 <= to)
     }

@@ -35,9 +35,8 @@ pub(super) struct State {
     pub(super) failing: AtomicBool,
     /// Ticks that the loop skipped because the recorder was too far behind.
     pub(super) gaps: ArrayQueue<Gap>,
-    /// Two log times, ns; both are 0 before the first tick.
-    /// The time of the last tick that the loop recorded or skipped, and the time up to which data is synced or given
-    /// up.
+    /// Log time of the last tick that the loop recorded or skipped, ns. After it, the log time up to which data is
+    /// synced or given up, ns. Both are 0 before the first tick.
     pub(super) handed_ns: AtomicU64,
     pub(super) certain_ns: AtomicU64,
     /// Number of the recorder's steps so far, which distinguishes a stuck recorder from a slow one.

@@ -63,7 +63,7 @@ pub struct RecorderHandle {
     state: Arc<State>,
     /// Time to wait at the end for a medium that neither accepts data nor fails.
     pub(super) patience: Duration,
-    /// Time of the request to end, and whether the total wait is limited.
+    /// Time at which the end was requested, and whether the total wait is limited.
     ending: Option<(Instant, bool)>,
 }
 
@@ -222,7 +222,7 @@ impl RecorderPort {
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
         self.state.hand(at);
         if self.gap.is_none() {
-            // A full queue of events has no reader, so the event isn't needed.
+            // If the queue of events is full, nothing reads the events, so this one may be dropped.
             self.state.events.push(RecordingEvent::Behind).ok();
         }
         let gap = self.gap.get_or_insert(Gap { span: (at, at), packets: 0 });
@@ -250,12 +250,12 @@ impl RecorderPort {
         self.entries.ring.capacity().get()
     }
 
-    /// Returns how many bytes of the queue an entry takes whose message has `len` bytes.
+    /// Returns the bytes of the queue taken by an entry with a message of `len` bytes.
     pub const fn entry_bytes(len: usize) -> usize {
         ENTRY_HEAD_BYTES.saturating_add(len)
     }
 
-    /// Returns how many bytes of the queue the entry of a tick with `packets` packets takes.
+    /// Returns the bytes of the queue taken by the entry of a tick with `packets` packets.
     pub const fn tick_entry_bytes(packets: usize) -> usize {
         Self::entry_bytes(TICK_HEAD_BYTES.saturating_add(packets.saturating_mul(2)))
     }

@@ -45,7 +45,7 @@ struct OpenPart {
     fresh: bool,
     /// Number of synced messages from sources in this part.
     raw_messages: u64,
-    /// Number of synced messages in this part, and their bytes.
+    /// Number of synced messages in this part, and total length of these messages, bytes.
     certain: (u64, u64),
     /// Log time of the last message before this part.
     before: Option<MonoNs>,
@@ -58,7 +58,7 @@ struct Outage {
     wait: Duration,
 }
 
-/// A statement of a loss: time before it, time after it, and text.
+/// A statement of a loss: time before the loss, time after it, and text.
 type Statement = (Option<MonoNs>, Option<MonoNs>, String);
 
 /// A recording in one or several parts.

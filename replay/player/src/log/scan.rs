@@ -409,7 +409,7 @@ impl Scan {
         numbers.map(|(schema, _)| *schema).any(|schema| schema > 0 && !self.schemas.contains_key(&schema))
     }
 
-    /// Searches all chunks for channel definitions, which truncated logs of other writers need.
+    /// Searches all chunks for channel definitions. Truncated logs of other writers have them nowhere else.
     ///
     /// Definitions in intact chunks take precedence over those outside chunks.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {

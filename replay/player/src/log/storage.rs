@@ -10,12 +10,12 @@ use crate::atomic_file::{folder_of, number_of};
 pub trait Storage: Send {
     /// Creates a file. Once this function returns, the file's name survives a power cut.
     ///
-    /// Errors: the file exists already; those of the system.
+    /// Errors: the file exists already; system errors.
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>>;
 
     /// Removes a file.
     ///
-    /// Errors: the file doesn't exist; those of the system.
+    /// Errors: the file doesn't exist; system errors.
     fn remove(&mut self, path: &Path) -> io::Result<()>;
 
     /// Free bytes on the file's medium; `None` if unknown.
@@ -26,7 +26,7 @@ pub trait Storage: Send {
 pub trait StoredFile: Send {
     /// Appends the first of these bytes, as many as possible, and returns their number.
     ///
-    /// Errors: those of the system; the caller retries after `Interrupted`.
+    /// Errors: a system error; after `Interrupted` the caller tries again.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
     /// Syncs the file. Once this function returns, everything written so far survives a power cut.
@@ -34,7 +34,7 @@ pub trait StoredFile: Send {
     /// After an error, nothing written since the last success is certain. If another program has changed the file,
     /// nothing in it is certain.
     ///
-    /// Errors: those of the system; another program has deleted, truncated or replaced the file.
+    /// Errors: a system error; another program has deleted, truncated or replaced the file.
     fn sync(&mut self) -> io::Result<()>;
 }
 
@@ -73,7 +73,7 @@ impl Storage for Disk {
     }
 }
 
-/// Change by another program to a recording's file. Its content is then gone, or no longer at its path.
+/// Change by another program to a recording's file. The file's content is then gone, or no longer at its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Taken {
     #[error("another program has deleted the file")]
@@ -85,7 +85,7 @@ pub(super) enum Taken {
 }
 
 impl Taken {
-    /// Whether an error was caused by such a change.
+    /// Whether an error reports a change by another program to the file.
     pub(super) fn is_in(error: &io::Error) -> bool {
         error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<Self>)
     }
@@ -93,7 +93,7 @@ impl Taken {
 
 /// A file on the disk, which other programs may delete, truncate or replace.
 ///
-/// If another program moves it, writing continues in the moved file, and nothing is lost.
+/// If another program moves the file, writing continues in the moved file, and nothing is lost.
 struct DiskFile {
     file: File,
     path: PathBuf,

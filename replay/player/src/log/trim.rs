@@ -28,7 +28,8 @@ pub struct Trim<'a> {
     pub change: Change<'a>,
     /// Whether to keep voice recordings within the spans.
     pub voices: bool,
-    /// Decides for a topic whether its results are kept. Results are kept only if the whole dive is kept.
+    /// Decides for a topic whether its results are kept. Used only if the whole dive is kept; otherwise no results are
+    /// kept.
     pub results: &'a dyn Fn(&str) -> bool,
 }
 

@@ -38,7 +38,7 @@ pub struct RecorderWorker {
     skipped: u64,
     /// Ids of the sources.
     ids: Vec<String>,
-    /// Packets dropped by lines since the last statement, by source; and time of that statement.
+    /// Packets dropped by lines since the last statement, by source. After it, the time of that statement.
     dropped: BTreeMap<u16, Dropped>,
     dropped_stated: Duration,
     /// Log time of the last entry. A voice recording has no log time of its own, so it gets this one.

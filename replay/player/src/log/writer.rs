@@ -194,7 +194,7 @@ impl LogWriter<BufWriter<File>> {
 impl<W: Write> LogWriter<W> {
     /// Starts a log, and writes everything that comes before the first message.
     ///
-    /// Errors: those of the writer; the topic of a result doesn't begin with `/result/`; more channels than MCAP
+    /// Errors: an error of the writer; the topic of a result doesn't begin with `/result/`; more channels than MCAP
     /// allows.
     pub fn new(writer: W, header: &LogHeader) -> Result<Self, LogError> {
         if let Some(result) = header.results.iter().find(|result| !result.topic.starts_with(RESULT_PREFIX)) {
@@ -288,7 +288,7 @@ impl<W: Write> LogWriter<W> {
 
     /// Writes the totals up to the end of this part, and whether another part follows. Closes the chunk.
     ///
-    /// Errors: those of the writer.
+    /// Errors: an error of the writer.
     pub(super) fn end_part(&mut self, follows: bool) -> Result<(), LogError> {
         let messages = self.before.messages + self.messages;
         let after = Progress { messages, tick: self.last_tick, ..Progress::default() };
@@ -300,7 +300,7 @@ impl<W: Write> LogWriter<W> {
 
     /// Writes bytes from `source`, received at `received` and valid at `valid`.
     ///
-    /// Errors: those of the writer; the header has no such source.
+    /// Errors: an error of the writer; the header has no such source.
     pub fn raw(
         &mut self,
         source: u16,
@@ -313,14 +313,14 @@ impl<W: Write> LogWriter<W> {
 
     /// Writes bytes sent to `source`.
     ///
-    /// Errors: those of the writer; the header has no such source.
+    /// Errors: an error of the writer; the header has no such source.
     pub fn sent(&mut self, source: u16, at: MonoNs, bytes: &[u8]) -> Result<(), LogError> {
         self.message(Lane::Sent(source), at, at, bytes)
     }
 
     /// Writes a tick of the loop, with the source numbers of its packets in the order of consumption.
     ///
-    /// Errors: those of the writer; the header has no ticks.
+    /// Errors: an error of the writer; the header has no ticks.
     pub fn tick(&mut self, index: u64, now: MonoNs, order: &[u16]) -> Result<(), LogError> {
         let packets =
             u32::try_from(order.len()).map_err(|_| LogError::TickTooLong { packets: order.len() })?;
@@ -335,7 +335,7 @@ impl<W: Write> LogWriter<W> {
 
     /// Writes a message of result channel `channel`.
     ///
-    /// Errors: those of the writer; the header has no such result.
+    /// Errors: an error of the writer; the header has no such result.
     pub fn result(&mut self, channel: u16, time: MonoNs, bytes: &[u8]) -> Result<(), LogError> {
         self.message(Lane::Result(channel), time, time, bytes)
     }
@@ -391,7 +391,7 @@ impl<W: Write> LogWriter<W> {
 
     /// Writes a statement of a loss between `from` and `to`; `None` if a time is unknown. Closes the chunk.
     ///
-    /// Errors: those of the writer.
+    /// Errors: an error of the writer.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {
         let entry = (format!("{:06}", self.losses), stated_loss(from, to, words));
         let record = Metadata { name: LOSSES.to_owned(), metadata: seal(LOSSES, [entry].into()) };
@@ -402,7 +402,7 @@ impl<W: Write> LogWriter<W> {
 
     /// Closes the chunk and flushes the writer. Everything written so far then survives a crash.
     ///
-    /// Errors: those of the writer.
+    /// Errors: an error of the writer.
     pub fn flush(&mut self) -> Result<(), LogError> {
         self.chunks += u64::from(self.chunk_began.take().is_some());
         self.writer.flush().map_err(LogError::writing("a chunk"))
@@ -410,7 +410,7 @@ impl<W: Write> LogWriter<W> {
 
     /// Writes the summary, flushes, and returns the writer.
     ///
-    /// Errors: those of the writer.
+    /// Errors: an error of the writer.
     pub fn finish(mut self) -> Result<(W, Summary), LogError> {
         let chunks = self.writer.finish().map_err(LogError::writing("the summary"))?.chunk_indexes.len();
         let mut writer = self.writer.into_inner();
@@ -452,7 +452,7 @@ struct Medium {
     is_spared: AtomicBool,
 }
 
-/// Closes the medium to further bytes on drop.
+/// On drop, makes the medium refuse further bytes.
 struct Closing(Arc<Medium>);
 
 impl Drop for Closing {

@@ -66,7 +66,7 @@ impl SnapshotStore {
         self.used_bytes += references;
     }
 
-    /// Returns the bytes of the snapshot with this time, which [`SnapshotStore::latest`] has returned.
+    /// Returns the bytes of the snapshot of time `at`. [`SnapshotStore::latest`] returns such times.
     pub fn load(&self, at: MonoNs) -> Option<Vec<u8>> {
         self.snapshots.get(&at).map(|blocks| blocks.concat())
     }

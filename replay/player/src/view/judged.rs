@@ -39,7 +39,7 @@ pub(super) struct Sections {
     runs: BTreeMap<u64, (i64, i64)>,
     /// Runs that have changed, each with its change.
     ///
-    /// The next judgement is that of the section that changed them. It creates the alert to the pilot.
+    /// The next judgement is of the section that caused the change, and creates the alert to the pilot.
     changed_runs: Vec<(u64, u64)>,
     shown: Option<MonoNs>,
     changed: bool,

@@ -21,9 +21,9 @@ use bins::Bins;
 
 /// A beam is a cone, and its range is formed from all the wall within it.
 ///
-/// The range is that of the nearest point, the mean, or the surface by the paper's interpolation.
+/// The range is that of the nearest point, the mean, or the surface by the interpolation of Jorge et al. 2021.
 ///
-/// Keys:
+/// Keys, with defaults in brackets:
 /// - `rays` per beam, from 1 to 1024 (16; 64 if `form` is bilinear).
 /// - `width_deg`, the cone's full width, from 0.1 to 60; or `frequency_khz`, the frequency that determines the width of
 ///   a head's beam, from 600 to 1000. The default is a head's own width, and 30 degrees for an echosounder.
@@ -211,7 +211,7 @@ impl BeamCone {
         }
     }
 
-    /// Range of the surface by the paper's definition.
+    /// Range of the surface as Jorge et al. 2021 define it.
     ///
     /// Each ray's echo, weighted by beam strength and incidence, is shared between the two nearest range bins. The
     /// surface is in the bin with the largest sum.

@@ -12,7 +12,7 @@ pub(super) struct Behind {
 }
 
 impl Behind {
-    /// Applies the head's offset to the next ping.
+    /// Applies the head's offset to a ping.
     ///
     /// `made` is false if the head missed the step to this ping. `told` is true if the reported angle includes the
     /// offset.

@@ -189,7 +189,8 @@ mod tests {
         assert!((0.046..0.051).contains(&sd_mps), "{sd_mps}");
         let correlation = lagged / speeds;
         assert!((correlation - math::exp(-1.0)).abs() < 0.04, "{correlation}");
-        // Each drawn speed lasts for one step, so the variance is that of the sum of a discrete process.
+        // Each drawn speed lasts for one step. The expected variance is therefore computed for the sum of a discrete
+        // process.
         let kept = math::exp(-1.0 / STEPS);
         let wanted = 0.05 * 0.05 * seconds * (20.0 / STEPS) * (1.0 + kept) / (1.0 - kept);
         assert!((ways / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / f64::from(runs)), "{ways} {wanted}");

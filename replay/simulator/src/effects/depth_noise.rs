@@ -142,7 +142,7 @@ mod tests {
         }
     }
 
-    /// The drift's increments are independent of the noise of the same samples.
+    /// The drift's increments are independent of the noise in these samples.
     #[test]
     fn noise_and_drift_are_independent() {
         let stream = Stream::new(3, "depth_noise", "depth");

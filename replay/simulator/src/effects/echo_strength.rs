@@ -27,7 +27,7 @@ mod sonar;
 /// the sonar equation. A ping therefore gets a return with probability exp(-1 / m), where m is the mean power divided
 /// by the power that is just detected.
 ///
-/// Keys, in addition to `from_m` and `to_m` of the stretch:
+/// Keys, with defaults in brackets, in addition to `from_m` and `to_m` of the stretch:
 /// - the water's `temperature_degc`, 0 to 40 (10), and its silt, `silt_gpl` in grams per litre, 0 to 100 (0), with
 ///   grains of radius `grain_um`, 0.5 to 100 (10). Water and silt absorb sound.
 /// - the wall's backscatter relative to rough rock, `wall_db`, -60 to 20 (0).

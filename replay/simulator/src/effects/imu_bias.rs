@@ -225,8 +225,8 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Compares, over many seeds, the variance at the first sample and much later, and the correlation exp(-t / tau)
-    /// between the two.
+    /// Compares, over many seeds, the variance at the first sample and much later, and the correlation between the two
+    /// with exp(-t / tau).
     #[test]
     fn biases_are_stationary_and_decorrelate_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);
@@ -252,8 +252,8 @@ mod tests {
         assert!((both / n - wanted).abs() < 5.0 * math::sqrt((1.0 + wanted * wanted) / n), "{}", both / n);
     }
 
-    /// Twice as many samples give the same process: the variance of the change over a time doesn't depend on the sample
-    /// rate.
+    /// The process doesn't depend on the sample rate: with twice as many samples, the change over a time has the same
+    /// variance.
     #[test]
     fn bias_change_depends_on_time_not_on_sample_count() {
         let change = |millis: i64| {

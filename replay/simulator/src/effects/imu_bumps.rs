@@ -23,7 +23,7 @@ const SPAN_S: f64 = 1.0;
 
 /// From time to time the vehicle bumps into the wall, a rock or its own cable. It is pushed one way and swings back.
 ///
-/// Keys:
+/// Keys, with defaults in brackets:
 /// - `per_hour`, up to 1,800 (required).
 /// - `speed_mps = [least, most]`, the speed that a bump gives the vehicle ([0.02, 0.1]). Speed and direction are drawn
 ///   evenly.
@@ -104,7 +104,7 @@ impl ImuBumps {
         each.reduce(|a, b| a + b)
     }
 
-    /// Share of a bump's speed that the vehicle has `after_s` seconds after the bump's start.
+    /// Share of a bump's speed that the vehicle has gained `after_s` seconds after the bump's start.
     fn share(&self, after_s: f64) -> f64 {
         let turn = (after_s / self.parameters.seconds).clamp(0.0, 1.0);
         (1.0 - math::cos(math::TAU * turn)) / 2.0

@@ -20,7 +20,7 @@ use crate::stages::Stage;
 
 /// Thrusters shake an inertial unit at one frequency.
 ///
-/// Keys:
+/// Keys, with defaults in brackets:
 /// - `frequency_hz`, 1 to 2,000 (required): the shaft's turns per second, or that number times the number of blades.
 /// - `accel_mps2` and `gyro_degps`, the amplitudes along and about each axis of the unit, zero by default.
 ///

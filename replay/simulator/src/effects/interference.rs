@@ -35,7 +35,7 @@ use pings::{Ping, Pings};
 /// margin. The other head is within the beam if its angle is at most half the beam's width plus half the angular size
 /// of the other head's body.
 ///
-/// Keys:
+/// Keys, with defaults in brackets:
 /// - `sensors`, two or more heads that share a frequency (all heads). There is one table per frequency.
 /// - `share`, the probability of hearing through side lobes, from 0 to 1 (0).
 /// - `margin_deg`, from 0 to 45. The default is half the other head's beam width, since the insonified patch is that
@@ -45,7 +45,7 @@ use pings::{Ping, Pings};
 /// head is already listening are extrapolated from the two pings before. The extrapolation is wrong for one or two
 /// pings when a head reverses.
 ///
-/// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, which plans with the same two paths.
+/// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, in which the planner uses the same two paths.
 pub(super) struct InterferenceKind;
 
 /// Upper bound of the distance between heads, m. Vehicle files place them within 20 m of the body's origin in x, y and

@@ -16,7 +16,7 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// The senses of all sensors.
+/// The quantities that sensors measure.
 pub(super) const SENSES: [Sense; 6] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether];
 

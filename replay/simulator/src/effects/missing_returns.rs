@@ -22,10 +22,11 @@ use crate::stages::Stage;
 /// Some pings get no return: a random share of all pings, singly or in runs; pings at grazing incidence; and pings at
 /// far walls.
 ///
-/// The three parts are independent of each other, and at least one is required. Keys:
+/// The three parts are independent of each other, and at least one is required. Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which returns are lost.
-/// - `share` of all pings, from 0 to 0.95 (0), and the mean length of their runs, `mean_run` pings, from share / (1 -
-///   share), or 1 if that is more, to 10,000 (1 / (1 - share): independent pings).
+/// - `share`, the share of pings lost at random, from 0 to 0.95 (0). `mean_run`, the mean number of consecutive lost
+///   pings, to 10,000. It is at least 1 and at least share / (1 - share). The default 1 / (1 - share) makes pings
+///   independent.
 /// - `grazing_from_deg` and `grazing_to_deg`, the incidence above which some pings are lost, and the incidence from
 ///   which all are lost; from 0, perpendicular to the wall, to 90.
 /// - `far_from_m` and `far_to_m`, the range above which some pings are lost, and the range from which all are lost;

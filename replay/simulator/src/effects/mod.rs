@@ -1,6 +1,6 @@
 //! The effects that a scene may name. Each has a file of its own.
 //!
-//! An effect that isn't named adds no system, component or random number.
+//! An effect that isn't named adds no system, component or random number. Defaults of keys are in brackets.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 

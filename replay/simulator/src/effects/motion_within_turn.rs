@@ -1,4 +1,4 @@
-//! Heads look from the vehicle's pose at each ping.
+//! Each ping starts from the vehicle's pose at the time of the ping.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -10,7 +10,7 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::stages::{AIM_HELD, Stage, aim_moving};
 
-/// Heads look from the vehicle's pose at each ping.
+/// Each ping starts from the vehicle's pose at the time of the ping.
 ///
 /// Without this effect, all pings of a turn are from the pose at the turn's beginning, as in simulators that take a
 /// whole scan at once.

@@ -12,7 +12,7 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::sensing::Mounted;
 
-/// A sensor's true mount differs from that in the vehicle file, which the loop uses.
+/// A sensor's true mount differs from the mount in the vehicle file. The loop uses the vehicle file.
 ///
 /// `position_m` and `angles_deg` (roll, pitch and yaw, applied before the file's angles) are added to the mounts of all
 /// named sensors. `position_sd_m`, to 1, and `angles_sd_deg`, to 30, are the standard deviations of additional errors,

@@ -24,7 +24,7 @@ use crate::stages::Stage;
 /// The range is half the length of this path, (r1 + r12 + r2) / 2. Such an echo replaces the direct echo more often
 /// towards grazing incidence, since the strength of the direct echo is proportional to the cosine of incidence.
 ///
-/// Keys:
+/// Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
 /// - `square_share` (0) and `share` (0.1), the shares of returns for a beam perpendicular to the wall and for a beam
 ///   along the wall, both from 0 to 1. In between, the share grows with 1 minus the cosine of incidence.

@@ -18,14 +18,16 @@ use crate::stages::Stage;
 
 /// Bubbles, clouds of silt or weed in front of the wall return the sound.
 ///
-/// Consecutive pings hit the same cluster and return about the same range. The next cluster has another range. Keys:
+/// Consecutive pings hit the same cluster and return about the same range. The next cluster has another range. Keys,
+/// with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
-/// - the `share` of pings, from 0 (excluded) to 0.95, and the mean length of their runs, `mean_run` pings, as in
-///   missing_returns.
+/// - `share`, the share of pings that hit a cluster, from 0 (excluded) to 0.95. `mean_run`, the mean number of
+///   consecutive pings that hit a cluster, as in missing_returns.
 /// - `near_m` (0.6) and `far_m` (3), the ranges between which a cluster lies, drawn evenly, from 0 to 200 m.
 /// - `spread_m` (0.1), the standard deviation of the returns about the cluster's range.
 ///
-/// A return beyond the wall isn't heard. Source: field.md, "murk": 5 % near returns. Runs: see missing_returns.
+/// A cluster beyond the wall gives no return. Source: docs/why/field.md, "murk": 5 % near returns. Runs: see
+/// missing_returns.
 pub(super) struct NearReturnsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -154,8 +156,8 @@ mod tests {
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         assert!((pings / whole - share).abs() < 5.0 * math::sqrt(variance), "{}", pings / whole);
 
-        // Within a run, the variance is that of the spread. The variance of the runs' means is that of evenly
-        // distributed ranges, and a little more.
+        // Within a run, the variance is the square of the spread. The means of the runs vary slightly more than evenly
+        // distributed ranges.
         let long: Vec<&Vec<f64>> = runs.iter().filter(|run| run.len() > 1).collect();
         let (mut within, mut freedom, mut means) = (0.0, 0.0, Vec::new());
         for run in &long {

@@ -18,7 +18,7 @@ use crate::stages::Stage;
 /// Parts of the vehicle occlude beams. Bodies of other heads, boxes of the hull and the tether return an echo instead
 /// of the wall.
 ///
-/// If the part is nearer than the sonar's least range, there is no return. Keys:
+/// If the part is nearer than the sonar's least range, there is no return. Keys, with defaults in brackets:
 /// - `heads` (true), `hull` (true) and `tether` (false): whether these occlude beams.
 /// - for the tether, which is a straight cylinder: `tether_from_m`, its start in the body's frame (required);
 ///   `tether_towards`, its direction ([-1, 0, 0], aft); `tether_length_m`, from 0.1 to 500 (20); `tether_radius_m`,
@@ -27,7 +27,7 @@ use crate::stages::Stage;
 /// Only the beam's axis is tested. A wide beam is therefore occluded over the same angle as a narrow one, and not
 /// gradually. A body doesn't occlude a head inside it, so idealised heads in one place don't occlude each other.
 ///
-/// Source: core/sampling/src/occlusion.rs, which plans with the same bodies.
+/// Source: core/sampling/src/occlusion.rs, in which the planner uses the same bodies.
 pub(super) struct OcclusionKind;
 
 #[derive(Debug, Clone)]

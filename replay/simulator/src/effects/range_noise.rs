@@ -17,7 +17,7 @@ use crate::stages::Stage;
 
 /// Ranges have normally distributed noise, with a constant part and a part proportional to the range.
 ///
-/// The effect acts in the whole tunnel, or from `from_m` to `to_m`.
+/// The effect acts in the whole tunnel, or in the stretch from `from_m` to `to_m`.
 pub(super) struct RangeNoiseKind;
 
 #[derive(Debug, Clone, Copy)]

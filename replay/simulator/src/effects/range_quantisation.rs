@@ -17,7 +17,7 @@ use crate::stages::Stage;
 
 /// Ranges are rounded to steps, as if read from an echo with a limited number of points.
 ///
-/// Keys, of which at most one is allowed:
+/// Keys, with defaults in brackets. At most one is allowed:
 /// - `quantum_m`, the step in metres as the device computes them, from 0.0005 to 1. A head computes with 1500 m/s, an
 ///   echosounder in metres of water.
 /// - `points`, the number of steps over a head's range setting, from 50 to 10,000 (500).

@@ -23,10 +23,10 @@ use crate::stages::Stage;
 /// Some ranges come from side lobes that meet the wall nearer and more perpendicularly than the beam.
 ///
 /// There are four side lobes, two in the plane of turning and two across that plane. The range of the nearest such lobe
-/// is reported with some probability. Keys:
+/// is reported with some probability. Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
-/// - their `angle_deg` from the beam's axis, from 0.1 to 80 (1.59 times the beam's width).
-/// - the probability `share`, from 0 (excluded) to 1 (0.05).
+/// - `angle_deg`, the angle of the side lobes from the beam's axis, from 0.1 to 80 (1.59 times the beam's width).
+/// - `share`, the probability, from 0 (excluded) to 1 (0.05).
 ///
 /// Source: the first side lobe of a circular piston, ka sin x = 5.136 against 1.616 at half power (Urick, "Principles
 /// of underwater sound", ch. 3). The side lobe is 17.6 dB weaker than the beam, so it matters where the wall reflects

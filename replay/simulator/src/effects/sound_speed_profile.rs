@@ -19,8 +19,9 @@ use crate::stages::Stage;
 /// cold.
 ///
 /// Devices compute ranges with the vehicle file's speed. The error of a range depends on the mean slowness along the
-/// path. Keys, besides `from_m` and `to_m` of the stretch: the speed at the floor, `floor_mps`, from 1300 to 1700 (the
-/// file's), and its change per metre of height, `per_metre_mps`, from -50 to 50 (0). One degree is about 4 m/s.
+/// path. Keys, with defaults in brackets, besides `from_m` and `to_m` of the stretch: the speed at the floor,
+/// `floor_mps`, from 1300 to 1700 (the file's), and its change per metre of height, `per_metre_mps`, from -50 to 50
+/// (0). One degree is about 4 m/s.
 ///
 /// Bending of the ray isn't simulated. The ray's radius of curvature is the speed divided by the gradient: 300 m at 5
 /// m/s per metre, or 2 degrees over 10 m of range. Source: Urick, "Principles of underwater sound", ch. 5 (travel time

@@ -18,8 +18,9 @@ use crate::stages::Stage;
 /// A sonar reports a constant range, whatever its beam meets. Possible causes are the sonar's own frame, or a bubble in
 /// front of the transducer.
 ///
-/// Keys: the range `range_m` (0.55), from 0.01 to 200 m; the start `from_s` (0) and the end `to_s` (never), in seconds
-/// from the dive's start. Source: a head in its frame reported 0.55 m throughout a whole dive.
+/// Keys, with defaults in brackets: the range `range_m` (0.55), from 0.01 to 200 m; the start `from_s` (0) and the end
+/// `to_s` (never), in seconds from the dive's start. Source: a head in its frame reported 0.55 m throughout a whole
+/// dive.
 pub(super) struct StuckRangeKind;
 
 #[derive(Debug, Clone, Copy)]

@@ -12,9 +12,11 @@ pub struct PerSensor<P>(pub Vec<(usize, P)>);
 impl<P: Clone> PerSensor<P> {
     /// Reads an effect's tables. The key `sensors` of a table names the sensors to which the table applies.
     ///
-    /// If the key is absent, the table applies to all sensors of these senses. `read` reads the effect's own keys.
+    /// If the key is absent, the table applies to all sensors that measure one of the quantities `senses`. `read` reads
+    /// the effect's own keys.
     ///
-    /// Errors: the vehicle lacks a named sensor; a sensor is named twice or has another sense; a key is unknown.
+    /// Errors: the vehicle lacks a named sensor; a sensor is named twice or measures another quantity; a key is
+    /// unknown.
     pub fn read(
         tables: Vec<Section<'_>>,
         facts: &Facts,

@@ -113,7 +113,7 @@ impl Axis {
         [chainage_m, y, point.z()]
     }
 
-    /// Number of the nearest piece; chainage and distance to the left of the axis, m.
+    /// Number of the piece nearest to a point; the point's chainage and its distance to the left of the axis, m.
     pub(super) fn locate(&self, plan: Yz) -> (usize, f64, f64) {
         let mut nearest = (0, 0.0, 0.0);
         let mut least = f64::INFINITY;
@@ -227,7 +227,7 @@ impl Piece {
         (self.anchor_m + radius_m.abs() * turned, self.left_of(plan))
     }
 
-    /// Whether this piece is certainly farther than `least_m` from `plan`.
+    /// Whether this piece is certainly farther than `least_m` from the point `plan`.
     fn is_beyond(&self, plan: Yz, least_m: f64) -> bool {
         let (ahead, left) = self.relative(plan);
         let reach_m = least_m + (self.to_m - self.anchor_m).max(self.anchor_m - self.from_m);

@@ -1,4 +1,5 @@
-//! Upper bound on the gauge's slope, which sets the length of steps along rays.
+//! Upper bound on the slope of the gauge, which determines the length of steps along rays. See [`super::tube`] for the
+//! gauge.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
@@ -54,9 +55,10 @@ impl Steepness {
     /// An upper bound on the slope of the gauge, 1/m. It holds wherever the gauge is at most 1.
     ///
     /// Let R(phi) be the distance of the wall from the reference point, and D(chainage, arc) the displacement of the
-    /// wall. The gauge of a point at distance rho is rho / (R - D). The slope of the gauge in the section is sqrt(1 +
-    /// (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel, the slope of D adds to the slope of the gauge. So does the
-    /// change of scale, which moves points in proportion to their distance from the floor's centre.
+    /// wall. The gauge of a point is rho / (R - D), where rho is the distance of the point from the reference point.
+    /// The slope of the gauge in the section is sqrt(1 + (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel, the
+    /// slope of D adds to the slope of the gauge. So does the change of scale, which moves points in proportion to
+    /// their distance from the floor's centre.
     pub(super) fn gauge_slope_pm(
         &self,
         bulges: &[Bulge],

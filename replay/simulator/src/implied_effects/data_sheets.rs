@@ -5,9 +5,9 @@
 //! | imagenex881 | beam_cone | beam width at the head's frequency | the data sheet: 2.4 to 1.4 degrees |
 //! | | echo_strength | the effect's defaults | the data sheet |
 //! | | range_quantisation | 500 points | the switch command, field 19; Jorge et al. 2021, §9.2 |
-//! | | range_noise | 10 mm | field.md, "data sheet" |
+//! | | range_noise | 10 mm | docs/why/field.md, "data sheet" |
 //! | ping1d | beam_cone | 30 degrees | the data sheet: 0.52 rad |
-//! | | range_noise, outliers, missing_returns | 20 mm; 8 %; 5 % in runs of 8 | field.md, "data sheet" |
+//! | | range_noise, outliers, missing_returns | 20 mm; 8 %; 5 % in runs of 8 | docs/why/field.md, "data sheet" |
 //! | bar100 | depth_steps, depth_noise | 31.2 mm; a count of 305 Pa / 2 | the data sheet: 3.05 mbar; resolution 3 mbar |
 //! | models with known noise | imu_noise, imu_bias | the device's own figures | the device's crate, through [`Device::inertial_noise`] |
 //!

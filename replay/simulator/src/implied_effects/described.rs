@@ -29,8 +29,8 @@ const FRICTION: f64 = 0.01;
 const DRAWN_MPS: f64 = 0.2;
 /// Distance on either side of an opening within which its corners cause double reflections, m.
 const BESIDE_M: f64 = 1.0;
-/// Length over which the end of a steel lining disturbs a compass, m, and the largest disturbance, degrees. Values of
-/// the scene steel.toml.
+/// Length over which the end of a steel lining disturbs a compass, m, and the largest disturbance, degrees. The values
+/// are from the scene steel.toml.
 const STEEL_END_M: f64 = 6.0;
 const STEEL_END_DEG: f64 = 10.0;
 
@@ -207,7 +207,7 @@ impl Described {
             let place_m = [murk.stretch.from_m, murk.stretch.to_m];
             let by = format!("murk of {} g/l from {} to {} m", murk.silt_gpl, place_m[0], place_m[1]);
             let call = |effect, keys: &[_]| Call::new(effect, by.clone(), keys).within(place_m);
-            // Values from field.md, "murk": runs of lost returns, 5 % near returns, second echoes.
+            // Values from docs/why/field.md, "murk": runs of lost returns, 5 % near returns, second echoes.
             let lost = [("share", number(0.2)), ("mean_run", number(6.0))];
             let near = [("share", number(0.05)), ("mean_run", number(3.0))];
             let silt = [("silt_gpl", number(murk.silt_gpl)), ("grain_um", number(murk.grain_um))];
@@ -269,7 +269,7 @@ impl Lining {
     /// Adds the effects of a lining.
     ///
     /// A smooth wall returns little sound except at perpendicular incidence, and more sound by indirect paths. The ends
-    /// of a steel lining disturb compasses. Shares are those of the scene steel.toml. The backscatter relative to rough
+    /// of a steel lining disturb compasses. The shares are from the scene steel.toml. The backscatter relative to rough
     /// rock is from Urick, "Principles of underwater sound", ch. 8 (smooth bottoms are 10 to 20 dB below rock).
     fn call(self, stretch: Stretch, [heads, sonars, units]: [&[String]; 3], calls: &mut Vec<Call>) {
         let (name, wall_db, share) = match self {

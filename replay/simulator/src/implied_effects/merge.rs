@@ -1,10 +1,10 @@
-//! Merges many calls for effects into one set of tables. Where two calls for an effect overlap, the keys of the later
-//! call apply.
+//! Merges many calls for effects into one set of tables. A call is one reason to simulate an effect, see [`Call`].
+//! Where two calls for an effect overlap, the keys of the later call apply.
 
 use super::{Call, Called, Fate, Value};
 use crate::effects::KINDS;
 
-/// Key with a list as its value. Lists of several calls are concatenated; for other keys the later call's value
+/// Key whose value is a list. The lists of several calls are concatenated. For any other key the later call's value
 /// applies.
 const PLACES: &str = "places";
 
@@ -13,7 +13,8 @@ const GROUPED: &str = "interference";
 
 type Keys = Vec<(&'static str, Value)>;
 
-/// Sensors with the same pieces. For [`GROUPED`], also the group of sensors.
+/// Sensors whose tables have the same ranges of chainage and the same keys. For [`GROUPED`], also the sensors that the
+/// call names.
 type Shared<'a> = (Vec<&'a String>, Vec<Piece>, Option<Option<&'a Vec<String>>>);
 
 /// A table to write: the range of chainage where it applies, and its keys.
@@ -47,7 +48,7 @@ pub(super) fn merge(calls: &[Call]) -> Vec<Called> {
     all
 }
 
-/// The tables of an effect. Sensors with the same pieces share tables.
+/// The tables of an effect. Sensors with the same ranges of chainage and the same keys share tables.
 fn tables(effect: &str, calls: &[&Call]) -> String {
     let mut sensors: Vec<Option<&String>> = Vec::new();
     for call in calls {
@@ -67,7 +68,7 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
         };
         let acting: Vec<&Call> = calls.iter().filter(acts).copied().collect();
         let pieces = pieces(&acting);
-        // A table of this effect lists the heads of one frequency, so two calls give two tables.
+        // A table of this effect lists the heads of one frequency. Two calls therefore give two tables.
         let group = acting.first().filter(|_| effect == GROUPED).map(|call| call.sensors.as_ref());
         match shared.iter_mut().find(|(_, other, of)| *other == pieces && *of == group) {
             Some((ids, ..)) => ids.extend(sensor),

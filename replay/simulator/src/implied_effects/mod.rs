@@ -52,7 +52,7 @@ pub enum Fate {
 }
 
 impl Fate {
-    /// The fate as text for display.
+    /// Text for display.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Taken => "taken",
@@ -66,7 +66,7 @@ impl Fate {
 /// A value of an effect's key, as TOML.
 type Value = String;
 
-/// One reason for an effect, with the sensors, the range of chainage and the keys that follow from it.
+/// A call: one reason to simulate an effect, with the sensors, the range of chainage and the keys that follow from it.
 #[derive(Debug, Clone, PartialEq)]
 struct Call {
     effect: &'static str,

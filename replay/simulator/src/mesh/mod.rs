@@ -53,7 +53,7 @@ pub struct MeshHit {
     pub range_m: f64,
     /// Unit normal of the face, on the side from which the ray comes.
     pub normal: [f64; 3],
-    /// Number of the face in the input. The smallest number if the ray hits several faces at one point.
+    /// Number of the face in the input. If the ray hits several faces at one point, this is the smallest number.
     pub face: u32,
 }
 

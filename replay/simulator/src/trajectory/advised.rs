@@ -14,11 +14,11 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// Number of knots after a given time that the position at that time depends on.
+/// A position depends on the knots up to this many after its time.
 const KNOTS_AHEAD: i64 = 3;
 /// Speed at which the pilot goes back, m/s.
 const BACK_MPS: f64 = 0.2;
-/// Distance that a missed stretch must lie behind the vehicle before the pilot goes back, and the run-up before the
+/// Distance behind the vehicle, m, at which a missed stretch makes the pilot go back. After it, the run-up before the
 /// second pass, m.
 const BEHIND_M: f64 = 3.0;
 const RUN_UP_M: f64 = 2.5;
@@ -53,15 +53,15 @@ pub(super) struct Heeding {
     pub(super) within: f64,
     /// Whether the pilot passes missed stretches a second time.
     pub(super) goes_back: bool,
-    /// Whether the pilot keeps the vehicle stationary when advised to, and until the first advice. The advice is given
-    /// for estimating gyro biases, or if there is no position.
+    /// Whether the pilot stops when advised to, and waits for the first advice before setting out. The monitor advises
+    /// stops to estimate gyro biases, or if it has no position.
     pub(super) stands: bool,
     /// Time that the pilot waits before setting out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
     /// Maximum duration of the dive, s.
     pub(super) at_most_s: f64,
-    /// Amplitude of the drift: left, up, m; roll, pitch, yaw, radians. And its period, s.
+    /// Amplitude of the drift (left and up, m; roll, pitch and yaw, radians), and its period, s.
     pub(super) reach: Offsets,
     pub(super) period_s: f64,
 }

@@ -27,10 +27,10 @@ pub(super) struct Pilot {
     /// Number of stops per hour and of reversals per hour.
     pub(super) stops_per_hour: f64,
     pub(super) backs_per_hour: f64,
-    /// Shortest and longest duration of a stop, s, and of the distance back, m.
+    /// Shortest and longest duration of a stop, s. Shortest and longest distance of a reversal, m.
     pub(super) stop_s: [f64; 2],
     pub(super) back_m: [f64; 2],
-    /// Amplitude of the drift: left, up, m; roll, pitch, yaw, radians. And its period, s.
+    /// Amplitude of the drift (left and up, m; roll, pitch and yaw, radians), and its period, s.
     pub(super) reach: Offsets,
     pub(super) period_s: f64,
 }

@@ -12,7 +12,7 @@ use super::super::{
 };
 use super::*;
 
-/// A slow medium. It sends all bytes so far at each flush.
+/// A slow medium. At each flush it sends its whole content to a channel.
 struct SlowMedium {
     bytes: Vec<u8>,
     nap: Duration,
@@ -82,8 +82,8 @@ impl Write for Held {
     }
 }
 
-/// The unsynced time is that from the first to the last tick, until a sync returns.
-/// It is zero after a sync that began after the last tick.
+/// Until a sync returns, the unsynced time is the time from the first tick to the last. The unsynced time is zero after
+/// a sync that began after the last tick.
 #[test]
 fn unsynced_time_runs_from_last_sync_to_last_tick() {
     let (go, held) = mpsc::channel();
@@ -109,8 +109,8 @@ fn unsynced_time_runs_from_last_sync_to_last_tick() {
     assert_eq!(handle.finish().unwrap().messages, 7);
 }
 
-/// The medium has seconds of work. A dive on ports waits 0.6 s in total. Other recordings wait while there is
-/// progress.
+/// Writing the queue takes seconds. A dive from ports waits 0.6 s in total. Other recordings wait while the medium
+/// makes progress.
 #[test]
 fn recording_ends_in_time_only_on_request_on_a_slow_medium() {
     for in_time in [true, false] {
@@ -380,7 +380,8 @@ fn packets_dropped_by_lines_are_stated_per_source_every_few_seconds() {
     );
 }
 
-/// Every dropped packet is counted while the recorder is too slow, although the source of some is then unknown.
+/// Every dropped packet is counted while the recorder is too slow, but the source of some dropped packets is then
+/// unknown.
 #[test]
 fn drops_beyond_the_queue_capacity_are_counted() {
     let (medium, flushed) = slow(0);

@@ -1,5 +1,5 @@
-//! Recordings on a storage whose operations fail, each in turn, once or for a while.
-//! Every loss is reported, no message is written twice, and no cut-off log looks complete.
+//! Recordings on a storage with faults. Each operation fails in turn, once or for a while. Every loss is reported, no
+//! message is written twice, and no cut-off log looks complete.
 
 #![expect(
     clippy::disallowed_types,
@@ -316,13 +316,13 @@ fn synced_messages_survive_a_power_cut_after_an_error() {
         storage.store(true);
         let (seen, losses) = read_back(&folder);
         assert!(expected.starts_with(&seen), "operation {at}");
-        // Lost are at most half a second between syncs, and the step of the retry.
+        // The loss is at most the half second between two syncs, and the step of the retry.
         assert!(seen.len() as u64 >= 4 * (TICKS / 2 - 7), "operation {at}: {}", seen.len());
         assert!(!losses.is_empty(), "operation {at}");
     }
 }
 
-/// Returns the seconds of a dive that a kill loses, if each sync takes `sync`.
+/// Returns how many seconds of a dive are lost if the program is killed. Each sync takes `sync`.
 ///
 /// Every 20 ms a tick and 20 packets arrive.
 fn lost_s(sync: Duration) -> f64 {
@@ -390,7 +390,7 @@ fn recording_with_a_fault_is_recovered_as_one_log_that_states_it() {
     assert_eq!((recovered.len() as u64, losses.len()), (4 * TICKS, 1));
     let told = losses[0].to_string();
     assert!(told.contains(&summary.faults[0].words()), "{told}");
-    // The first part by itself misses the rest of the dive, and so isn't a whole dive.
+    // The first part alone lacks the rest of the dive, and is reported as cut off.
     let first = recover(&mut || DiveLog::open(&files[..1]), &mut Vec::new(), &[], "first").unwrap();
     assert!(first.messages < 4 * TICKS);
     assert!(first.losses.iter().any(|loss| loss.kind == LossKind::Truncated), "{:?}", first.losses);

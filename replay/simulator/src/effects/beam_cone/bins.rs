@@ -4,11 +4,11 @@ use headrace_geometry::math;
 
 /// Strengths in bins of equal width, which are centred on multiples of the width.
 ///
-/// The bins implement this sentence of the paper: "we use bilinear interpolation of range values of the 881L sensor to
-/// determine where the tunnel surface is". The head's picture is a grid of angle and range. An echo between grid points
-/// is shared linearly among the neighbouring points. In angle, the share is the beam strength, which falls linearly
-/// from the axis. The surface is the ridge of the picture. If the beam is oblique to the wall, its echo is long and the
-/// ridge is wide and low, as the paper found next to corners. Source: Jorge et al. 2021, §9.2.
+/// The bins implement this sentence of Jorge et al. 2021, §9.2: "we use bilinear interpolation of range values of the
+/// 881L sensor to determine where the tunnel surface is". The head's picture is a grid of angle and range. An echo
+/// between grid points is shared linearly among the neighbouring points. In angle, the share is the beam strength,
+/// which falls linearly from the axis. The surface is the ridge of the picture. If the beam is oblique to the wall, its
+/// echo is long and the ridge is wide and low, as that paper found next to corners.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bins {
     width_m: f64,

@@ -22,7 +22,7 @@ impl<M: Measurement> Stuck<M> {
 
 /// A measurement whose value can be replaced by that of another measurement.
 pub(super) trait Sticking: Measurement {
-    /// Returns this measurement with the value of `other`. Time and head angles stay.
+    /// Returns this measurement with the value of `other`. Time and head angles are unchanged.
     #[must_use]
     fn valued(self, other: &Self) -> Self;
 }

@@ -69,8 +69,8 @@ fn reflected_and_direct_paths_give_their_apparent_ranges() {
         ear.hear(1, &sounds);
         ear.heard.then_some(ear.within_m[1])
     };
-    // Both heads look at the middle of the floor, with equal paths. Pings at the same time interfere with neither head.
-    // An earlier ping of the other head is heard.
+    // Both heads look at the middle of the floor, and the two paths have equal length. Simultaneous pings don't
+    // interfere. An earlier ping of the other head is heard.
     let inwards = math::atan2(0.4, 2.5);
     let way_m = 2.0 * math::hypot(0.4, 2.5);
     assert_eq!(heard(-inwards, inwards, 0.0), None);

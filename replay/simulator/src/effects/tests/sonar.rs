@@ -22,7 +22,7 @@ fn pair() -> Dive {
     Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]])
 }
 
-/// Changes of each measurement by an effect. `effect` is the effect's index among those of the scene.
+/// Changes of each measurement by an effect. `effect` is the effect's index in the scene.
 fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
     let of = |row: &TruthRow| {
         let cause = row.causes.iter().find(|cause| cause.effect == effect)?;

@@ -1,4 +1,5 @@
-//! An independent model of the same environment. It tests whether points are in water, and follows rays in small steps.
+//! An independent model of the simulated environment. It tests whether points are in water, and follows rays in small
+//! steps.
 
 use super::*;
 
