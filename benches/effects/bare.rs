@@ -35,7 +35,7 @@ impl Said {
     }
 }
 
-/// Prints the schedule's overhead, with heads alone.
+/// Prints the schedule's overhead in a scene whose only sensors are heads.
 pub(crate) fn bare() {
     let text = text(LENGTH_M, "phase_shift", "");
     let scene = scenes::scene_from(&text, &|name| scenes::vehicle_file(name).map(heads_alone));

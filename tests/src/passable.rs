@@ -143,8 +143,8 @@ impl Outing {
         }
     }
 
-    /// The outing of a seed. Vehicles rotate with the seed, every second round of vehicles sways, and all other
-    /// values are drawn.
+    /// The vehicle and dive of a seed. Vehicles rotate with the seed, every second round of vehicles sways, and all
+    /// other values are drawn.
     pub fn drawn(seed: u64) -> Self {
         let mut draw = Draw::new(seed ^ 0x5eed_ad71);
         let turn = usize::try_from(seed).unwrap();

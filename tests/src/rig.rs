@@ -252,8 +252,8 @@ impl View {
         places: &[String],
     ) {
         let (devices, on) = devices;
-        // Sent frames are counted before received ones. So a frame that arrives in
-        // between can't count as sent only.
+        // Sent frames are counted before received ones. So a frame that arrives in between never counts as sent but
+        // not received.
         self.whole = on.iter().map(|line| devices[*line].control().whole()).collect();
         self.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
         while let Some(status) = supervisor.next_status() {

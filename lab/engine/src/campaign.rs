@@ -260,7 +260,7 @@ impl Campaign {
         }
     }
 
-    /// Creates a session with the tables of these dives, those of version `before`, and `replay`.
+    /// Creates a session with the tables of these dives, the tables of version `before`, and the function `replay`.
     ///
     /// Errors: a table can't be registered.
     pub fn session(&self, finished: &Finished, before: Option<&str>) -> Result<SessionContext, Error> {

@@ -12,7 +12,7 @@ use headrace_tests::tracking::{self, Silence, Track, dive, filter};
 const SEEDS: u64 = 20;
 /// Distance that the vehicle covers in one turn of its head, m.
 const T_X_M: f64 = TURN_S * 0.197;
-/// Number of epochs after which the estimate has settled.
+/// Number of epochs after which the estimate has converged.
 const SETTLED: usize = 50;
 
 type Pick = fn(&Figures) -> f64;

@@ -235,7 +235,7 @@ struct Prepared {
     settings: Vec<Setting>,
     /// The distinct settings. A default lies on the lines of several settings, but is measured once.
     unique: Vec<(u32, Way)>,
-    /// Number of seeds, and errors, of each distinct setting.
+    /// For each distinct setting, the number of seeds and the errors.
     errors: Vec<(u32, Vec<Error>)>,
     /// Dives of the first seed, by rate of the inertial unit, Hz.
     first: Vec<(u32, Dived)>,
