@@ -86,7 +86,7 @@ pub struct Rig {
 
 /// Result of a dive.
 pub struct Ended {
-    /// View at the end.
+    /// State of the dive at its end.
     pub view: View,
     /// History of each line.
     pub lines: Vec<LineHistory>,
