@@ -432,7 +432,7 @@ impl Dived {
         JudgedDive { report: report.clone(), truth: Arc::clone(truth), sections: sections.clone() }
     }
 
-    /// Time over which errors accumulate between neighbouring passes of a place, s. The filter computes the same time.
+    /// Time over which errors accumulate between neighbouring passes of a place, s. The filter uses this time, too.
     fn between_passes_s(&self, place: &Place) -> f64 {
         let heads = self.vehicle.heads();
         let passes_per_s = heads.len() as f64 / place.turn_s;
