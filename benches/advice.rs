@@ -3,8 +3,8 @@
 //! `cargo bench -p headrace_tests --bench advice` runs all parts; `-- truth`, `-- sweep` or `-- planned` runs one part:
 //! - truth: ratio of the advised speed to the largest passing speed, over `--dives N` (100) steady and swaying dives
 //!   from `--from-seed N`, or over the dives of `--seeds A,B,...`;
-//! - sweep: four heads in phase for 0.1 m/s and driven at speeds 1 mm/s apart, then heads in phase for each of these
-//!   speeds;
+//! - sweep: dives with four heads at speeds 1 mm/s apart; first with heads in phase at 0.1 m/s, then with heads in phase
+//!   at the driven speed;
 //! - planned: each shipped vehicle in each mode at 0.95 of the planned speed.
 //!
 //! D_true comes from `headrace_tests::truth`, which shares nothing with the program's coverage.

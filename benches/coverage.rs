@@ -1,11 +1,11 @@
-//! Compares covering samples and finding holes with other methods on the same samples, and measures the samples'
-//! memory. Prints Markdown.
+//! Compares headrace's sample store and hole search with other methods on the same samples, and measures the memory
+//! of the store. Prints Markdown.
 //!
 //! `cargo bench -p headrace_tests --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory`
-//! runs only the memory part. Absolute times drift on shared machines, but the ratios hold. kiddo's tree and the hash
-//! map answer queries at given points only. On a grid of points their D is accurate to some centimetres, while
-//! headrace and the triangulation are exact. kiddo before version 6 panicked if more than 32 samples shared a
-//! coordinate; ideal heads produce only a few.
+//! runs only the memory part. Absolute times drift on shared machines, but the ratios hold. The tree of the crate
+//! `kiddo` and the hash map answer queries at given points only. On a grid of points their D is accurate to some
+//! centimetres, while headrace and the triangulation are exact. kiddo before version 6 panicked if more than 32
+//! samples shared a coordinate; ideal heads produce only a few.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::disallowed_types, reason = "std's hash map is a reference here")]

@@ -111,7 +111,8 @@ fn answer(program: &str, arguments: &[&str]) -> String {
 struct Course {
     sent: Arc<SegQueue<(MonoNs, Vec<u8>)>>,
     delays: Arc<SegQueue<DurNs>>,
-    /// Send times of messages that the loop hasn't consumed yet. `ends` has the delays up to the ends of their ticks.
+    /// Send times of messages that the loop hasn't consumed yet. `ends` has the delay of each consumed message up to
+    /// the end of its tick.
     to_consume: Arc<SegQueue<MonoNs>>,
     ends: Arc<SegQueue<DurNs>>,
 }

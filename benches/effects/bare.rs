@@ -13,7 +13,7 @@ use headrace_tests::scenes;
 
 use crate::{SPEED_MPS, best, text, timed};
 
-/// Many rounds, because the figure is a small difference of two times.
+/// The number of rounds is large, because the result is a small difference of two times.
 const ROUNDS: usize = 40;
 const LENGTH_M: f64 = 80.0;
 const SECOND: DurNs = DurNs(1_000_000_000);
@@ -35,7 +35,7 @@ impl Said {
     }
 }
 
-/// Prints the schedule's overhead, with heads alone.
+/// Prints the schedule's overhead in a scene whose only sensors are heads.
 pub(crate) fn bare() {
     let text = text(LENGTH_M, "phase_shift", "");
     let scene = scenes::scene_from(&text, &|name| scenes::vehicle_file(name).map(heads_alone));
@@ -90,7 +90,7 @@ struct ByHand<'a> {
     heads: Vec<(Head, Mount)>,
     end: MonoNs,
     due: Vec<Sounding>,
-    /// Time, source, and start and end of the bytes.
+    /// For each message: time, source, and start and end of its bytes.
     waiting: Vec<(MonoNs, usize, usize, usize)>,
     bytes: Vec<u8>,
 }

@@ -41,8 +41,8 @@ impl Missed {
         };
         let first_go = matches!(cell.driven, Driven::Planned | Driven::Stood | Driven::Advised);
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
-        // D is the best of several visits, but D_true combines all visits. In the `Lively` condition, the pilot also
-        // goes back.
+        // D and D_true are comparable only after a single visit: D is the best of several visits, but D_true combines
+        // all visits. In the `Lively` condition, the pilot also goes back.
         let once = match cell.driven {
             Driven::Back => false,
             Driven::Planned | Driven::Stood | Driven::Times(_) => cell.condition != Condition::Lively,

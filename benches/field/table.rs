@@ -12,7 +12,7 @@ use crate::goals::{Missed, advice_share};
 /// Place that one vehicle reaches by driving from a launch near the portal, m.
 const DRIVEN_THERE: Place = ("driven", 6900.0);
 const LET_IN_M: f64 = 60.0;
-/// Places up to this chainage have the same chainage in all tunnels, m.
+/// Largest chainage of a place near the portal, m. Such places have the same chainage in all tunnels.
 const NEAR_M: f64 = 100.0;
 
 /// A cell with its name.

@@ -12,7 +12,7 @@ use nalgebra_of_peers as peers;
 
 use crate::dive::Dive;
 
-/// State indices of the measured errors: the attitude's three.
+/// Indices of the measured states: the three attitude errors.
 const MEASURED: [usize; 3] = [6, 7, 8];
 const NOISE: f64 = 1e-3;
 const INNOVATION: f64 = 1e-3;

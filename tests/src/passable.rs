@@ -79,12 +79,12 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// Ratio of the speed advised at the planned speed to the true largest speed.
+    /// Ratio of two speeds: the advice to a vehicle at the planned speed, and the true largest speed.
     pub fn ratio(&self) -> f64 {
         self.over_true(self.advised_mps)
     }
 
-    /// Ratio of the speed advised while the pilot follows the advice to the true largest speed.
+    /// Ratio of two speeds: the advice to a pilot who follows it, and the true largest speed.
     pub fn followed_ratio(&self) -> f64 {
         self.over_true(self.followed.told_mps())
     }
@@ -143,8 +143,8 @@ impl Outing {
         }
     }
 
-    /// The outing of a seed. Vehicles rotate with the seed, every second round of vehicles sways, and all other
-    /// values are drawn.
+    /// The vehicle and dive of a seed. Vehicles rotate with the seed, every second round of vehicles sways, and all
+    /// other values are drawn.
     pub fn drawn(seed: u64) -> Self {
         let mut draw = Draw::new(seed ^ 0x5eed_ad71);
         let turn = usize::try_from(seed).unwrap();

@@ -86,7 +86,7 @@ pub struct Rig {
 
 /// Result of a dive.
 pub struct Ended {
-    /// View at the end.
+    /// State of the dive at its end.
     pub view: View,
     /// History of each line.
     pub lines: Vec<LineHistory>,
@@ -252,8 +252,8 @@ impl View {
         places: &[String],
     ) {
         let (devices, on) = devices;
-        // Sent frames are counted before received ones. So a frame that arrives in
-        // between can't count as sent only.
+        // Sent frames are counted before received ones. So a frame that arrives in between never counts as sent but
+        // not received.
         self.whole = on.iter().map(|line| devices[*line].control().whole()).collect();
         self.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
         while let Some(status) = supervisor.next_status() {

@@ -22,7 +22,7 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// A setting: method, knob and value.
+/// A setting as text: the name of the varied parameter, and its value.
 pub(crate) fn setting(point: &Point) -> String {
     if point.value.is_empty() { point.knob.clone() } else { format!("{} {}", point.knob, point.value) }
 }

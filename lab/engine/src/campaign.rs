@@ -153,7 +153,7 @@ impl Campaign {
         Ok(all)
     }
 
-    /// Makes the processes of a session replay the dives that the cache lacks; returns all dives by log.
+    /// Makes the processes of a session replay the dives that are missing from the cache; returns all dives by log.
     ///
     /// A process that ends early loses its answers, but its finished dives are in the cache. The other dives are sent
     /// again, as long as their number decreases.
@@ -260,7 +260,7 @@ impl Campaign {
         }
     }
 
-    /// Creates a session with the tables of these dives, those of version `before`, and `replay`.
+    /// Creates a session with the tables of these dives, the tables of version `before`, and the function `replay`.
     ///
     /// Errors: a table can't be registered.
     pub fn session(&self, finished: &Finished, before: Option<&str>) -> Result<SessionContext, Error> {

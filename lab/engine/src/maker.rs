@@ -137,7 +137,8 @@ impl Maker {
         Ok(Made::Kept { sha256, folder })
     }
 
-    /// Finds a dive's tables in the cache; `None` if the log's digest is unknown or the cache lacks the dive.
+    /// Finds a dive's tables in the cache; `None` if the log's digest is unknown or the dive is missing from the
+    /// cache.
     ///
     /// Waits for a free thread. The dive isn't counted.
     ///

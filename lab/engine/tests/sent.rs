@@ -1,4 +1,4 @@
-//! A campaign whose replays are sent to a session of other processes, which is lost.
+//! Tests a campaign that sends replays to a session of other processes and loses that session.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by them")]
 

@@ -288,7 +288,7 @@ impl Collector {
         }
     }
 
-    /// Collects the aims of pings that had no return.
+    /// Collects the target point of each ping without a return.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn aims_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();

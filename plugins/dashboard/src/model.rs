@@ -30,7 +30,7 @@ const MOST_PLACES: usize = 1500;
 /// Maximum number of samples in the answer to a request for a range of chainage.
 pub const MOST_IN_RANGE: usize = 200_000;
 
-/// Sort of a message, for viewers that want only some messages.
+/// Kind of a message, for viewers that want only some messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sort {
     /// A state, which replaces the previous one.
@@ -46,7 +46,7 @@ pub enum Sort {
 pub struct Message {
     /// Number of the message.
     pub seq: u64,
-    /// Sort of the message.
+    /// Kind of the message.
     pub sort: Sort,
     /// Content of the message.
     pub body: Body,
@@ -453,7 +453,7 @@ impl Model {
         section_frame(self.seq, &all)
     }
 
-    /// Returns alerts, notes, history and the way back as messages, for an exported file.
+    /// Returns alerts, notes, history and the stretches to go back for as messages, for an exported file.
     pub fn closing(&self) -> Vec<Value> {
         let mut all = self.lists();
         all.push(self.history.message(self.seq));

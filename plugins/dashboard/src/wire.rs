@@ -34,7 +34,8 @@ pub struct SectionRecord {
     pub cause: u8,
     /// Number of the reason for "can't say"; 255 if there is none.
     pub why: u8,
-    /// Bit 0: flagged. Bit 1: settled. Bits 2 to 4: verdict for a second target plus 1, or 0 without a second target.
+    /// Bit 0: flagged. Bit 1: settled, which means that no further sample on the present course can change the
+    /// verdict. Bits 2 to 4: verdict for a second target plus 1, or 0 without a second target.
     pub flags: u8,
     /// Diameter of the hole, its standard deviation, and chainage and arc length of its centre, m; NaN if there is
     /// none.

@@ -39,8 +39,8 @@ struct MeasuredTurn {
     period: DurNs,
 }
 
-/// Default housing of the family's heads, about the beam. Source: radius from Jorge et al. 2021, §8.3. The lengths are
-/// estimates.
+/// Default housing of the family's heads, relative to the beam. Source: radius from Jorge et al. 2021, §8.3. The
+/// lengths are estimates.
 const USUAL_BODY: HeadBody = HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 };
 
 /// Checked settings of a head. Every command built from these settings can be encoded.

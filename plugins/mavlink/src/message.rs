@@ -217,8 +217,8 @@ pressure_messages! {
 const TYPE_AT: usize = 10;
 const ORIENTATION_AT: usize = 12;
 
-/// The crate rejects types and orientations that its definitions lack. Here neither is parsed as an enumeration: the
-/// sensor type isn't used, and the orientation is a plain number in the vehicle file.
+/// The crate rejects types and orientations that aren't in its definitions. Here neither is parsed as an enumeration:
+/// the sensor type isn't used, and the orientation is a plain number in the vehicle file.
 impl MessageData for Distance {
     type Message = MavMessage;
 

@@ -75,7 +75,7 @@ fn decode_message(decoder: &mut MavlinkDecoder, message: &Message) -> Vec<Readin
     readings.into_iter().map(|decoded| decoded.reading).collect()
 }
 
-/// Readings of the emulated part. `feel` fills in the measurements.
+/// Readings of one part of the vehicle, sent by the emulated autopilot. `feel` fills in the measurements.
 fn emulated<M: Measurement>(
     emulator: &mut dyn Emulator<M>,
     decoder: &mut MavlinkDecoder,

@@ -44,7 +44,7 @@ pub trait LineRecord: Send + Sync {
 
     /// Records that packets of a sensor were dropped between two times.
     ///
-    /// Packets are dropped by a full ring, or unread by the carrier.
+    /// A packet is dropped if the ring is full, or if the carrier discards it unread.
     fn lost(&self, sensor: usize, from: MonoNs, to: MonoNs, packets: u64);
 }
 
@@ -483,7 +483,7 @@ impl LineService {
         }
     }
 
-    /// Updates the status of each device. A complaint of the line itself overrides them.
+    /// Updates the status of each device. A problem that the line itself reports overrides them.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
             let (phase, words) = device.judge(now);

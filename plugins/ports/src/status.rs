@@ -62,7 +62,7 @@ pub struct LineHistory {
     pub opened: u64,
     /// Number of times the line was lost, or reopened because of silence.
     pub lost: u64,
-    /// Number of packets dropped because the loop's ring was full, or unread by the carrier.
+    /// Number of packets dropped because the loop's ring was full, or because the carrier discarded them unread.
     pub dropped: u64,
     /// Number of messages from rejected senders.
     pub strangers: u64,

@@ -174,7 +174,7 @@ mod tests {
 
     use super::wind_up;
 
-    /// How the loop ends a line, given functions that notify the line, wait for it, and drain its ring.
+    /// A function that ends a line as the loop does. Its arguments notify the line, wait for it, and drain its ring.
     type Ends = fn(&dyn Fn(), &mut dyn FnMut(), &mut dyn FnMut());
 
     /// Explores a model of a line's thread, which behaves as `LineService::run`.

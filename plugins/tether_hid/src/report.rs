@@ -214,7 +214,7 @@ impl ReportLayout {
         })
     }
 
-    /// Encodes a whole report. Fields that the layout lacks are omitted, and missing values are zero.
+    /// Encodes a whole report. Fields outside the layout are omitted, and fields without a value are zero.
     pub fn encode(&self, report: &Report) -> Vec<u8> {
         let mut bytes = vec![0; self.report_bytes];
         let mut put = |offset: usize, value: &[u8]| {

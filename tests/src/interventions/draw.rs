@@ -55,7 +55,7 @@ counts_per_metre = 2000
 #[expect(missing_docs, reason = "the variants name their fields")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Injected {
-    /// A stretch at this multiple of the speed.
+    /// A stretch that is driven at this multiple of the dive's speed.
     TooFast { over_m: [f64; 2], factor: f64 },
     /// A mode with coarser steps.
     AngularStep { mode: &'static str },

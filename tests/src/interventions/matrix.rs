@@ -50,7 +50,7 @@ pub struct Matrix {
     pub pairs: Count,
     /// Stretches that truly have two causes. A nearly right answer counts as right: see [`super::Judged::is_close`].
     pub close_pairs: Count,
-    /// Stretches that are displayed as one run at most.
+    /// Stretches that are displayed as at most one run.
     pub one_run: Count,
     /// Number of dives without a failed section.
     pub idle: u32,

@@ -300,7 +300,7 @@ fn truncated_log_is_used_up_to_the_cut_and_the_rest_reported_lost() {
             let last_s = messages[read - 1].log_time as f64 * 1e-9;
             assert!((seconds(losses[0], "after") - last_s).abs() < 1e-3, "{losses:?}, last {last_s}");
 
-            // The readable part gives the same results as a complete log with these messages.
+            // The readable part gives the same results as an undamaged log that has only the readable messages.
             write_log(&folder.path("short.mcap"), WriteOptions::new(), Some(VEHICLE), &messages[..read]);
             let (_, short) = folder.replay("short.mcap", &[]);
             assert_eq!(report["digest"], short["digest"], "{log} {tenths}");

@@ -94,7 +94,7 @@ fn speed_limit_returns_before_the_heads_reach_new_wall() {
         .filter(|state| state["speed_mps"].as_f64().is_some_and(|mps| mps > 0.25))
         .collect();
     let first = again.iter().find(|state| state["condition"] == "too_fast").unwrap();
-    // The front heads are 0.55 m before the vehicle's origin and have seen the wall up to that distance.
+    // The front heads are 0.55 m ahead of the vehicle's origin, so they have sampled the wall that far ahead of it.
     let x_m = figure(&first["position"], "chainage_m");
     assert!((9.0..11.5).contains(&x_m), "{x_m}");
     assert!(again.iter().any(|state| state["condition"] == "passed"));

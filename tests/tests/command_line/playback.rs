@@ -87,7 +87,7 @@ fn interrupted_demonstration_keeps_its_report_and_summary() {
     assert_eq!(faults(&super::report_schema::schema(), &report), Vec::<String>::new());
     let duration_s = report["dive"]["duration_s"].as_f64().unwrap();
     assert!(duration_s > 0.0);
-    // The log contains the same dive.
+    // A replay of the log gives the digest in the report.
     let (_, replayed) = folder.replay("demo/dive.mcap", &[]);
     assert_eq!(replayed["digest"], report["digest"]);
 }

@@ -17,8 +17,8 @@ const DIVES: u64 = 24;
 const EDGE_MPS: f64 = 0.118;
 const LENGTH_M: f64 = 14.0;
 const TOLD_WITHIN_S: f64 = 2.0;
-/// Known number of sections that pass with D_true over 1.1 T; the goal is zero. In these sections, samples from
-/// before and during the doubt meet, and the reported sigma is too small.
+/// Known number of sections that pass with D_true over 1.1 T; the goal is zero. These sections have samples from
+/// before the counter is doubted and from afterwards, and the reported standard deviation is too small.
 const KNOWN_FAR: usize = 1;
 
 /// A dive during which the counter is stuck.

@@ -1,4 +1,4 @@
-//! Scenes with a single injected cause each, which the report must give for their failed sections.
+//! Scenes that each inject a single cause. The report must state this cause for the failed sections.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

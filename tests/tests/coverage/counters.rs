@@ -5,8 +5,8 @@ use headrace_tests::{scenes, truth};
 
 /// Number of dives of each kind.
 const DIVES: u64 = 8;
-/// Largest allowed error of the displayed speed, m/s. The fault that this test guards against displayed 0.98 for a
-/// vehicle at 0.2.
+/// Largest allowed error of the displayed speed, m/s. The tests guard against a fault that displayed 0.98 m/s for a
+/// vehicle at 0.2 m/s.
 const SPEED_OFF_MPS: f64 = 0.2;
 
 /// Legs of a dive: distance, m, speed, m/s, and duration of the stop at the end, s.

@@ -1,4 +1,4 @@
-//! The report accounts for every metre of the dive. A dive without a position says so first.
+//! The report accounts for every metre of the dive. The report of a dive without a position states this first.
 //!
 //! Each section that the vehicle or its heads have entered is judged or open, even if no head has looked at it.
 
@@ -276,7 +276,7 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
 
 #[test]
 fn stretch_without_a_position_counts_and_fails_when_left() {
-    // Some seconds after the cable falls silent, the filter drops its fix.
+    // Some seconds after the cable counter falls silent, the filter has no fix any more.
     let report = steady(12.0, &silence("\"tether\"", "from_s = 25\nfor_s = 50"));
     accounted_for("outage", &report);
     let lost =
@@ -341,8 +341,8 @@ fn dive_mostly_without_a_position_exits_with_1() {
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
 }
 
-/// Samples from the time when the estimate settles don't affect later sections. A vehicle that waits for a known
-/// heading loses only the metres that its front heads saw while it waited.
+/// Samples from before the position estimate has converged don't affect later sections. A vehicle that waits for a
+/// known heading loses only the metres that its front heads sampled while it waited.
 #[test]
 fn waiting_for_a_known_heading_leaves_no_undecided_metre() {
     let vehicle = VEHICLE.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.09");

@@ -98,7 +98,7 @@ fn flag_of_a_moving_vehicle_is_raised_within_one_turn() {
 
 /// Longest distance that the heads may move before the flag is raised, m (`docs/why/coverage.md`, "Verdicts").
 const LATE_M: f64 = 0.25;
-/// Time from the start until the estimate has settled, seconds: the alignment, and another 20 s.
+/// Time from the start until the position estimate has converged, seconds: the alignment, and another 20 s.
 const SETTLED_S: f64 = 22.0;
 
 #[test]
@@ -110,7 +110,7 @@ fn flag_is_raised_within_25_cm_of_the_point_of_no_return() {
         let flags =
             if direct(judged) { &judged.by_two_sigma } else { &judged.journey.flags(judged.dive, 3.0) };
         for flag in flags {
-            // Standard deviations shrink while the estimate settles, but the report contains only the final ones.
+            // Standard deviations shrink while the estimate converges, but the report contains only the final ones.
             let settles = !direct(judged) && flag.due_s.is_some_and(|due_s| due_s < SETTLED_S);
             let is_late = flag.late_m.filter(|_| !settles).map(|late_m| late_m > LATE_M);
             on_time += u32::from(is_late == Some(false));

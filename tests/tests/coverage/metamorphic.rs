@@ -62,8 +62,8 @@ impl Beside<'_> {
                 && both(deviations[0], deviations[1])
         };
         let cause = |section: &SectionReport| section.cause.map(|evidence| evidence.cause);
-        // The dives may report different holes of the same size. The hole reported for the second dive must be one of
-        // the first, too.
+        // The dives may report different holes of the same size. The hole reported for the second dive must also be a
+        // hole of the first dive.
         let is_hole_here = b.hole_x_m.zip(b.hole_arc_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {
             near(2.0 * wall.clear_m([x - self.along_m, (self.around)(sigma)]), hole_m)
         });
@@ -234,7 +234,7 @@ fn head_order_does_not_change_results() {
     assert_eq!(answers(&got, &keys), answers(&expected, &keys));
 }
 
-/// A message with another name of its channel.
+/// A message whose channel has another name.
 fn renamed<'a>(message: &Message<'a>, named: &dyn Fn(&str) -> String) -> Message<'a> {
     let metadata = message.channel.metadata.iter().map(|(key, value)| (key.clone(), named(value))).collect();
     let topic = named(&message.channel.topic);

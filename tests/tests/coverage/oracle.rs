@@ -120,7 +120,7 @@ fn verdicts_follow_from_hole_sigma_and_target() {
         // Whether a circle touches the limit of the part that all heads have passed.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
-        // The place of the first such circle is known to one part of the section. The program uses the largest
+        // The first failing place is accurate to one part of the section ([`PARTS`]). The program uses the largest
         // standard deviation round the wall, and takes the farthest wall as the reach of a tilted head.
         let near_m = (section.end_m - section.start_m) / f64::from(PARTS) + 2.0 * section.hole_sd_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);

@@ -34,8 +34,8 @@ const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}
      imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
 
-/// Setting that is reported in a dive of 100 m by a pilot who wanders slightly. The vehicle is as in `truly`;
-/// headrace reads `told`.
+/// Setting that is reported in a dive of 100 m by a pilot who wanders slightly. `truly` describes the simulated
+/// vehicle, and `told` is the vehicle file that headrace reads.
 fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingReport> {
     told_swinging(truly, told, [aside_m, 3.0], seed)
 }

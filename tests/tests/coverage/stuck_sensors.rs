@@ -57,7 +57,8 @@ fn dive(scene: &Scene) -> Told {
     }
 }
 
-/// The fault can't be detected within its first second. The margin of passed sections covers its effect in this time.
+/// The fault can't be detected within its first second. The margin that passed sections must have covers the fault's
+/// effect in this second.
 #[test]
 fn stuck_inertial_unit_is_reported_and_passes_nothing_over_the_target() {
     let (mut passed, mut over) = (0, 0);

@@ -107,7 +107,7 @@ fn outline_arc_lengths_match_the_profile() {
     }
 }
 
-/// Whether a section isn't at the dive's end and has no samples from before the estimate settled.
+/// Whether a section isn't at the dive's end and has no samples from before the position estimate converged.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }

@@ -89,8 +89,8 @@ impl Surroundings {
         Self { vehicle: read(VEHICLE), vehicles }
     }
 
-    /// Takers for every sensor. In tables and ROS recordings a taker reads the stream with its sensor's name, and in
-    /// other files the only stream.
+    /// One [`Taker`] for each sensor, which states the stream that the sensor's data comes from. In tables and ROS
+    /// recordings this is the stream with the sensor's name, and in other files the only stream.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {
             Kind::Tlog => tlog::STREAM,

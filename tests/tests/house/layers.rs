@@ -55,7 +55,7 @@ fn may_need(place: &Path, needed: &Path) -> bool {
     match kind {
         "core" => core(needed).zip(core(place)).is_some_and(|(needed, place)| needed < place),
         "plugins" if place == Path::new("plugins/ports") => one_of(&FOR_PORTS),
-        // The page shows the loop's results, so it may use more crates.
+        // The page shows the loop's results, so it may use every crate of the core.
         "plugins" if place == Path::new(PAGE) => core(needed).is_some(),
         "plugins" => one_of(&FOR_DEVICES),
         "replay" => {

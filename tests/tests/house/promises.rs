@@ -1,8 +1,8 @@
-//! Checks that the tests exist that `docs/why/promises.md` and `docs/reference/recorder.md` name.
+//! Checks that every test named in `docs/why/promises.md` or `docs/reference/recorder.md` exists.
 
 use crate::workspace::root;
 
-/// Checks that each test named in a page's rows exists; returns the number of these rows.
+/// Checks that each test named in a row of a page exists; returns the number of rows that name tests.
 fn count_named_tests(page: &str) -> usize {
     let page = std::fs::read_to_string(root().join(page)).unwrap();
     assert!(page.lines().count() < 150);

@@ -51,7 +51,8 @@ fn live_dive_and_its_replay_have_the_same_digest() {
     );
 }
 
-/// In this dive failed sections settle, later passes clear flags, and verdicts depend on earlier verdicts.
+/// In this dive verdicts of failed sections become final, later passes clear flags, and verdicts depend on earlier
+/// verdicts.
 #[test]
 fn tick_length_does_not_change_failed_and_cleared_sections() {
     let folder = Folder::new();

@@ -276,7 +276,7 @@ fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
             assert!(dive.try_wait().unwrap().is_none(), "{name} has ended the dive");
         }
         signal(end, &dive);
-        // As with a closed terminal, nobody reads the output any more.
+        // Nobody reads the output any more, as if the terminal were closed.
         drop(lines);
         // Exit code 1: nothing was inspected.
         assert_eq!(ended(dive), Some(1), "{end}");

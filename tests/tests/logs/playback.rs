@@ -271,7 +271,7 @@ fn seeking_over_damage_reports_the_same_losses_as_a_straight_replay() {
             }
         }
     }
-    // Report and exit code must also be the same.
+    // Report and exit code must also equal those of a replay without pauses and seeks.
     for log in ["ticks.mcap", "parts"] {
         let (code, straight) = folder.replay(log, &[]);
         assert_eq!(code, Some(3));

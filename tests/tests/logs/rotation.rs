@@ -1,4 +1,5 @@
-//! A dive recorded in several parts equals the dive in one log, when it is replayed, verified, recovered, or killed.
+//! A dive recorded in several parts gives the same results as a dive in one log when it is replayed, verified or
+//! recovered, and also after a kill.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -105,7 +105,7 @@ fn goes_on_from_anywhere(scene: &Scene) {
     assert!(reports[0].dive.samples_valid > 100);
 }
 
-/// The dive goes back and forth, so that sections fail, settle and are cleared.
+/// The dive goes back and forth, so that sections fail, their verdicts become final, and later passes clear them.
 pub(crate) const LEGS: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.197\n\
     [[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.4\n[[trajectory.legs]]\ndistance_m = 7\nspeed_mps = -0.3\n";
 

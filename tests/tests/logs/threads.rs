@@ -67,8 +67,8 @@ impl PacketSource for Feed {
     }
 }
 
-/// A scene with four heads and back-and-forth motion. Sections fail, settle and are cleared, and an operator gives
-/// commands.
+/// A scene with four heads and back-and-forth motion. Sections fail, their verdicts become final, and later passes
+/// clear them. An operator gives commands.
 fn scene() -> Scene {
     scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{LEGS}{EFFECTS}"))
 }

@@ -12,7 +12,7 @@ use headrace_tests::tracking::{self, Silence, Track, dive, filter};
 const SEEDS: u64 = 20;
 /// Distance that the vehicle covers in one turn of its head, m.
 const T_X_M: f64 = TURN_S * 0.197;
-/// Number of epochs after which the estimate has settled.
+/// Number of epochs after which the estimate has converged.
 const SETTLED: usize = 50;
 
 type Pick = fn(&Figures) -> f64;
@@ -21,7 +21,7 @@ fn mean_of(all: &[Figures], pick: Pick) -> f64 {
     rms(all.iter().map(pick))
 }
 
-/// A dive with the filter, figures without the filter, and errors of the holes.
+/// Results of one dive: with the filter, without the filter, and the errors of its holes.
 struct Dives {
     filter: Track,
     without: Figures,
@@ -246,8 +246,8 @@ fn silent_sensors_keep_the_error_within_its_bounds() {
         ("everything", vec![0, 1, 2, 3, 4, 5, 6, 7]),
     ] {
         for to_s in [70.0, 120.0, f64::INFINITY] {
-            // In some dives, the motion guessed during the silence biases the learnt range noise. This shows when the
-            // unit is back.
+            // In some dives, the motion guessed during the silence biases the learnt range noise. The bias becomes
+            // visible when the unit returns.
             let seeds = if name == "the inertial unit" && to_s.is_finite() { 1..=6 } else { 3..=3 };
             let dives: Vec<_> = seeds
                 .map(|seed| silenced(seed, Silence { sources: sources.clone(), from_s: 60.0, to_s }))

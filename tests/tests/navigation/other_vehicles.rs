@@ -1,7 +1,7 @@
 //! A vehicle with a velocity log, and with an autopilot that has the inertial unit, the pressure sensor and the
 //! distance sensors.
 //!
-//! The crates of these devices are used unchanged. The test covers the way from the simulator's bytes to the
+//! The crates of these devices are used unchanged. The tests cover all steps from the simulator's bytes to the
 //! navigation.
 
 use headrace_tests::Folder;

@@ -1,4 +1,4 @@
-//! The screen after all devices have died during a dive. The displayed age grows although no data arrives.
+//! Tests the screen after all devices have died during a dive. The displayed age grows although no data arrives.
 
 use std::io::{BufRead as _, BufReader};
 use std::process::Stdio;

@@ -21,7 +21,7 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
 }
 
-/// Statuses that a busy machine may cause at the other end. The tests ignore them.
+/// Statuses of a sound sensor that appear only because the machine is busy. The tests ignore them.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
     "wrong: falls behind because replies are lost",

@@ -32,8 +32,8 @@ fn points(case: &mut Case) -> Vec<Yz> {
         .collect()
 }
 
-/// First edge that a ray meets, extended slightly. Returns the distance in ray lengths, and the sine between ray and
-/// edge.
+/// Finds the first edge that a ray meets, where each edge is extended slightly. Returns the distance in ray lengths,
+/// and the sine of the angle between ray and edge.
 fn meets(points: &[Yz], origin: Yz, ray: Yz) -> Option<(f64, f64)> {
     let cross = |a: Yz, b: Yz| a[0] * b[1] - a[1] * b[0];
     let edges = points.iter().zip(points.iter().cycle().skip(1));
@@ -51,7 +51,8 @@ fn rays(case: &mut Case) -> Result<(), String> {
     let given = points(case);
     let profile = match Profile::polygon(&given, Some([0.0, 3.0])) {
         Ok(profile) => profile,
-        // A polygon with too few distinct points or with a gap of half a turn is refused, and needs a reason.
+        // A polygon with too few distinct points or with a gap of half a turn is refused. The error must state a
+        // reason.
         Err(why) => return if why.to_string().is_empty() { Err("no reason".to_owned()) } else { Ok(()) },
     };
     for _ in 0..8 {

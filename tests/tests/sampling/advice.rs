@@ -124,7 +124,8 @@ impl Case {
         dive(&self.scene(planned_mps, speed_mps, length_m), self.dumb, TICK)
     }
 
-    /// Speed for which the heads are in phase. It is the advice for their mode with heads in phase for that advice.
+    /// Speed at which the heads are in phase. It is the advised speed for their mode, computed for heads that are in
+    /// phase at that same speed.
     fn planned_mps(&self) -> f64 {
         let first = dive(&self.scene(0.1, 0.1, 3.0), self.dumb, TICK);
         let alternatives = first.beats.last().unwrap().advice.alternatives;

@@ -27,7 +27,7 @@ struct Row {
 }
 
 impl Row {
-    /// Input `i`. The numbers begin with 1, as in the file's header.
+    /// Input number `i` of the row. Inputs are numbered from 1, as in the file's header.
     fn i(&self, i: usize) -> f64 {
         self.inputs[i - 1]
     }

@@ -125,7 +125,7 @@ fn only_named_effects_have_systems_components_and_streams() {
     assert_eq!(effect["systems"].as_array().unwrap().len(), 1);
     assert_eq!(effect["components"][0]["sensors"], serde_json::json!(["sonar_1"]));
     assert_eq!(effect["streams"], serde_json::json!(["sonar_1"]));
-    // A base system holds the aim during a turn. The effect replaces this system.
+    // A base system aims a head from the pose at the start of each turn. The effect replaces this system.
     let moving = explained(&folder, "motion_within_turn = {}");
     assert_eq!(moving["base"].as_array().unwrap().len(), base - 1);
     assert_eq!(moving["effects"][0]["replaces"], serde_json::json!(["aim_held"]));

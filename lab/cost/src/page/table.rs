@@ -40,7 +40,7 @@ pub fn table(trade: &Trade) -> String {
     text
 }
 
-/// The setting, without the knob's name if it equals the method's name.
+/// The setting as text. The name of the varied parameter is left out if it equals the method's name.
 fn shown(point: &Point) -> String {
     if point.knob == point.method { point.value.clone() } else { words::setting(point) }
 }

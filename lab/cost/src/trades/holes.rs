@@ -349,7 +349,7 @@ fn planned_t_m(vehicle: &VehicleConfig) -> Result<f64, CostError> {
     Ok(planner.t_max_m(mode, SPEED_MPS)?)
 }
 
-/// Judges the sections by the largest empty square of cells; a square as large as the target fails.
+/// Judges the sections by the largest empty square of cells. A section fails if its square is as large as the target.
 fn by_cells(dive: &JudgedDive, ended: &Loop) -> Vec<Judged> {
     let (target_m, squares) = (dive.report.target_m, cells::squares(ended));
     let judged = |section: &JudgedSection| {

@@ -1,4 +1,5 @@
-//! Cost of finer settings in the live loop: the rings of the advice, ticks, and vertices of a surveyed profile.
+//! Cost of finer settings in the live loop: the rays that the advice casts in a ring around each head, the length of
+//! a tick, and the vertices of a surveyed profile.
 
 use std::fmt::Write as _;
 
@@ -22,7 +23,8 @@ use crate::words::number;
 use headrace_oracle::dive::{Recorded, armed};
 use headrace_oracle::{TruthError, timed};
 
-/// Reference settings: the finest ring and interval, and a second lattice of rays that is coarser by a sixth.
+/// Reference settings: the densest ring of rays, recast after the smallest movement, and a second ring with a sixth
+/// fewer rays.
 const FINEST: Looks = Looks { ring: 3600, anew_m: Some(0.001) };
 const AS_FINE: Looks = Looks { ring: 3000, anew_m: Some(0.001) };
 /// Largest difference of speed that counts as equal, m/s.
@@ -102,13 +104,13 @@ fn scenes(inputs: &Inputs<'_>) -> Result<Vec<(&'static str, String)>, CostError>
     Ok(scenes)
 }
 
-/// A lively pilot of VITA 2 with four heads.
+/// A pilot of VITA 2 with four heads, who often stops, goes back and wanders.
 const PILOT: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"pilot\"\nstart_m = 5\nspeed_mps = 0.1\nstops_per_hour = 60\n\
     stop_s = [3, 8]\nbacks_per_hour = 60\nback_m = [0.5, 1]\nwander_across_m = 1.0\nwander_up_m = 0.5\nwander_yaw_deg = 10\n\
     wander_pitch_deg = 2\nwander_roll_deg = 2\n";
 const PILOT_EFFECTS: &str =
     "[effects]\nmotion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\nrange_noise = { sd_m = 0.01 }\n";
-/// Half a metre with VITA 2, for profiles with many vertices.
+/// A dive of about half a metre with VITA 2, for profiles with many vertices.
 const SHORT: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 0.6\nspeed_mps = 0.1\n\
     [effects]\nmotion_within_turn = {}\n";
 
@@ -165,7 +167,8 @@ struct Marker {
 }
 
 impl Prepared {
-    /// Prepares a scene; also returns the difference between two references and the median advised speed, m/s.
+    /// Prepares a scene. Also returns two speeds, m/s: the difference between the two references, and the median
+    /// advised speed.
     fn of(inputs: &Inputs<'_>, name: &'static str, text: &str) -> Result<(Self, f64, f64), CostError> {
         let settings = settings();
         let seeds = inputs.effort.pick(1, 3);

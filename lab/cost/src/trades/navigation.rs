@@ -33,7 +33,7 @@ use headrace_oracle::timed;
 const CHAINAGES_M: [u32; 3] = [16, 3000, 6900];
 /// Rate of the inertial unit of the vehicle files, Hz.
 const USUAL_HZ: u32 = 100;
-/// A tenth of the smallest shipped target, 0.5 m.
+/// Error below which more accuracy changes no decision, m: a tenth of 0.5 m, the smallest shipped target.
 const DECIDES_M: f64 = 0.05;
 /// Resolution of the time at which the vehicle passes a section, s.
 const MOMENT_S: f64 = 0.1;
@@ -235,7 +235,7 @@ struct Prepared {
     settings: Vec<Setting>,
     /// The distinct settings. A default lies on the lines of several settings, but is measured once.
     unique: Vec<(u32, Way)>,
-    /// Number of seeds, and errors, of each distinct setting.
+    /// For each distinct setting, the number of seeds and the errors.
     errors: Vec<(u32, Vec<Error>)>,
     /// Dives of the first seed, by rate of the inertial unit, Hz.
     first: Vec<(u32, Dived)>,
@@ -432,7 +432,7 @@ impl Dived {
         JudgedDive { report: report.clone(), truth: Arc::clone(truth), sections: sections.clone() }
     }
 
-    /// Time over which errors accumulate between neighbouring passes of a place, s. The filter computes the same time.
+    /// Time over which errors accumulate between neighbouring passes of a place, s. The filter uses this time, too.
     fn between_passes_s(&self, place: &Place) -> f64 {
         let heads = self.vehicle.heads();
         let passes_per_s = heads.len() as f64 / place.turn_s;

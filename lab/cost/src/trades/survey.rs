@@ -317,7 +317,7 @@ fn true_holes(
     planned: &[Planned<'_>],
     middle: [f64; 2],
 ) -> Result<Vec<Vec<TrueHole>>, CostError> {
-    // Without random effects, a seed changes only the position off the middle.
+    // Without random effects, a seed changes only the vehicle's offset from the middle of the tunnel.
     let seeds_of = |planned: &Planned<'_>| {
         if planned.way.drift_m > 0.0 { inputs.effort.pick(2, 5) } else { 1 }
     };

@@ -21,8 +21,8 @@ fn figure_6_shows_evenly_spaced_passes_and_a_faster_head() {
     assert!((figure.t_x_m - 0.197 * 4.8).abs() < 1e-9);
     assert_eq!(figure.at_crown.len(), 8);
     for pair in figure.at_crown.windows(2) {
-        // Pings a step of 2.4 degrees late or early shift a pass by 0.006 m; adjacent heads see the crown at different
-        // angles.
+        // Adjacent heads see the crown at different angles. A ping that is early or late by one step of 2.4 degrees
+        // shifts a pass by 0.006 m.
         assert!((pair[1].1 - pair[0].1 - spaced_m).abs() < 0.1 * spaced_m, "{:?}", figure.at_crown);
     }
     assert_eq!(figure.faster.len(), 8, "a way for each turn");

@@ -39,8 +39,8 @@ fn rises(ring: [bool; 8]) -> usize {
 
 /// Prunes and thins the image until neither step changes it, so that only single lines remain.
 ///
-/// One pass may not suffice. The end of a spur may be two pixels that keep each other, and a removed spur may leave a
-/// filled corner.
+/// One pass may not suffice. The end of a spur may be two pixels, neither of which is removed while the other is
+/// there. A removed spur may leave a filled corner.
 pub(super) fn clean(image: &mut Image) {
     loop {
         let before = image.pixels().len();
@@ -52,7 +52,7 @@ pub(super) fn clean(image: &mut Image) {
     }
 }
 
-/// Removes, one by one, pixels that are no ends and that no connection needs.
+/// Removes, one by one, pixels that are neither ends of a line nor needed for a connection.
 ///
 /// The remaining lines have no filled corners, and no pixel has more neighbours than the line's shape requires.
 fn to_single(image: &mut Image) {

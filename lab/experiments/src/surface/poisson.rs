@@ -123,7 +123,8 @@ struct Cloud<'a> {
     samples: &'a [Sample],
     /// Wall area of each sample, m^2.
     areas_m2: Vec<f64>,
-    /// Levels by which the level for spreading each normal is coarser than the finest level.
+    /// For each normal, the number of levels from the finest level down to the coarser level on which the normal is
+    /// spread.
     coarser: Vec<usize>,
     area_m2: f64,
 }

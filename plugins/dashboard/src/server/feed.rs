@@ -18,7 +18,7 @@ use crate::command::{Asked, Command, LONGEST};
 use crate::model::{Body, Message, Sort};
 use crate::site::May;
 
-/// Interval of pings, from the last answer, and timeout of an answer.
+/// Time from an answer to the next ping, and timeout of an answer.
 ///
 /// Together they drop a stalled viewer within [`STALLED_AFTER`], even if its machine buffers the feed unread.
 const PING_EVERY: Duration = Duration::from_secs(2);

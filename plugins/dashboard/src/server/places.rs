@@ -54,7 +54,8 @@ impl Places {
     }
 }
 
-/// If a class is full, closes its oldest connection without a stream, of the client with the most such connections.
+/// If a class is full, closes a connection that has no stream: the oldest one of the client with the most such
+/// connections.
 fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
     if held.iter().filter(|one| one.class == class).count() < MOST_OF_CLASS {
         return;

@@ -20,7 +20,7 @@ struct Rig {
     heard: Vec<(MonoNs, Message)>,
     /// Every n-th message from the host is lost; 0 means that none is lost.
     loses: usize,
-    /// Number of one more message from the host that is lost.
+    /// Index of a single further message from the host that is lost.
     loses_only: Option<usize>,
 }
 

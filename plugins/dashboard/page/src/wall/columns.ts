@@ -62,7 +62,7 @@ function widen(out: Uint32Array, count: number): void {
         const at = beside * WORDS;
         if (beside >= 0 && beside < count && ((out[at] ?? 0) & 7) !== ABSENT) out[at] = ((out[at] ?? 0) | FLAGGED_BIT) >>> 0;
       }
-      // Skips the column just added, so that it isn't widened in turn.
+      // Skips the column that has just been flagged, because it must not flag further columns.
       run = 0;
       column += 1;
       continue;

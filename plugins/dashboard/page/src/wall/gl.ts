@@ -134,8 +134,8 @@ export class WallGl {
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LESS);
     gl.bindVertexArray(small ? this.points : this.instanced);
-    // The window already holds samples near the seam twice.
-    // Further repetitions of the perimeter are drawn only if the view extends beyond one.
+    // The window already holds samples near the seam twice. Further repetitions of the perimeter are drawn only if
+    // the view is taller than one perimeter.
     for (const shift of rounds(view)) {
       gl.uniform1f(program.at("u_shift"), shift);
       if (small) gl.drawArrays(gl.POINTS, 0, discs.samples.count);
