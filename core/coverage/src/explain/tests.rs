@@ -305,7 +305,7 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
 
 /// With a target of 0.5 m and steps of 0.3 m along the wall, 0.4 m remain along the tunnel.
 #[test]
-fn without_the_speed_cause_the_drive_has_the_largest_fitting_speed() {
+fn drive_has_the_largest_fitting_speed_after_removing_the_speed_cause() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
     let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
     // The speed is 0.4 m divided by the time of a pass, 2 s, and of a ping.
@@ -328,7 +328,7 @@ fn without_the_speed_cause_the_drive_has_the_largest_fitting_speed() {
 ///
 /// The planned speed helps only if distances shrink by more than the factor `HELPS`.
 #[test]
-fn without_the_phase_cause_the_drive_has_the_planned_speed_if_helpful() {
+fn drive_has_the_planned_speed_after_removing_the_phase_cause_if_helpful() {
     let then = |planned_gap_s: f64| {
         let drive = Drive {
             speed_mps: 0.1,
