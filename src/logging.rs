@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn event_is_one_line_whose_only_control_codes_are_colours() {
+    fn event_is_one_line_without_control_codes_except_colours() {
         let text = "\x1b[33mWARN\x1b[0m opened a\nb\x1b[2J\x1b]0;t\x07\u{202e}\n";
         let line = "\x1b[33mWARN\x1b[0m opened a\\nb\\u001b[2J\\u001b]0;t\\u0007\\u202e\n";
         assert_eq!(event(text.as_bytes()), line);

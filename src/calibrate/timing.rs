@@ -312,7 +312,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn source_that_seems_early_widens_all_standard_deviations() {
+    fn source_early_beyond_its_latency_widens_all_timing_sds() {
         let lag = |source, value, sd| Lag { source, offset_s: Ok(Estimate { value, sd }) };
         let latencies = [DurNs::from_secs_f64(0.01); 2];
         let sds = |mut lags: [Lag; 2]| {

@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_array_is_added_at_the_start() {
+    fn missing_array_is_added_at_the_start_of_the_file() {
         let opening = "openings = [{ name = \"gate\", from_m = 1, to_m = 2 }]\n";
         let added = change(&format!("{opening}heads.layout = \"x\"\n")).unwrap();
         assert_eq!(added, format!("{opening}{}", TEXT.replace("phase_shift", "x")));

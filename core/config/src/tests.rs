@@ -20,7 +20,7 @@ fn error_names_file_line_key_value_and_allowed_values() {
 }
 
 #[test]
-fn errors_about_a_missing_key_and_invalid_toml_name_the_line() {
+fn error_names_the_line_of_a_missing_key_or_invalid_toml() {
     let root = Document::new("v.toml", "\n[water]\n").root().unwrap();
     let water = root.section("water").unwrap().unwrap();
     let error =
@@ -93,7 +93,7 @@ fn all_errors_are_found_in_one_pass() {
 }
 
 #[test]
-fn valid_text_is_read_and_unread_key_is_rejected() {
+fn valid_text_is_read_and_unknown_key_is_rejected() {
     let read = Document::new("v.toml", "a = 1\n").read(|root| root.number("a", 0.0..=1.0));
     assert_eq!(read, Ok(Some(1.0)));
     let unread = Document::new("v.toml", "a = 1\nb = 2\n").read(|root| root.number("a", 0.0..=1.0));

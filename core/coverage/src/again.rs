@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn lowest_speed_is_advised_if_a_speed_helps_half_of_the_sections() {
+    fn lowest_speed_is_advised_if_slowing_down_helps_half_of_the_sections() {
         let fast = [section(Cause::TooFast, 0.12), section(Cause::TooFast, 0.1)];
         assert_eq!(again(&fast), Again { at_most_mps: 0.1, is_beyond_speed: false });
         let lost = section(Cause::MissingReturns, 0.0);

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn wider_circle_has_an_equal_deviation_all_round() {
+    fn circle_wider_than_the_profile_deviates_equally_all_round() {
         let deviation = turned(3.2, 400);
         assert!((deviation.mean_m().unwrap() - 0.2).abs() < 1e-9);
         let [inmost_m, outmost_m] = deviation.extremes_m().unwrap();

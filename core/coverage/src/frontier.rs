@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn section_leaves_the_zone_when_the_last_head_is_a_margin_past_it() {
+    fn section_is_left_behind_once_the_last_head_is_a_margin_past_it() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
@@ -427,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn sections_ahead_leave_the_zone_when_the_vehicle_moves_backwards() {
+    fn sections_are_left_ahead_when_the_vehicle_moves_backwards() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 2.0, 0.25, 0.25);
         let moved = frontier.advance(0, MonoNs(1), 1.7, 0.25, 0.25);
@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_may_land_ahead_until_the_vehicle_turns_back() {
+    fn samples_are_expected_ahead_until_the_vehicle_turns_back() {
         let mut frontier = Fixture::default();
         for x_m in [1.0, 2.0, 1.8] {
             frontier.advance(0, MonoNs(0), x_m, 0.25, 0.25);
@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_head_does_not_hold_back_the_zone() {
+    fn silent_head_does_not_delay_leaving_sections() {
         let mut frontier = Fixture::default();
         frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);
@@ -481,7 +481,7 @@ mod tests {
     }
 
     #[test]
-    fn updates_extend_only_the_coverage_extent_while_a_head_is_alive() {
+    fn vehicle_motion_only_extends_the_coverage_extent_while_a_head_is_alive() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 10, 3.5);
         frontier.ping(1, 10, 2.5);
@@ -502,7 +502,7 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_moves_the_zone_if_no_head_is_alive() {
+    fn vehicle_position_decides_which_sections_are_left_if_no_head_is_alive() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
@@ -515,7 +515,7 @@ mod tests {
     }
 
     #[test]
-    fn passed_stretch_spans_from_the_foremost_start_to_the_rearmost_position() {
+    fn stretch_passed_by_all_heads_runs_from_front_start_to_rear_end() {
         let mut frontier = Frontier::default();
         let at = |x_m: f64| Reach { from_m: x_m - 0.5, to_m: x_m + 0.5 };
         assert_eq!((frontier.through(), frontier.not_passed()), (None, None));
@@ -533,7 +533,7 @@ mod tests {
     }
 
     #[test]
-    fn all_heads_are_awaited_after_a_silence_of_all() {
+    fn every_head_is_awaited_again_after_all_heads_were_silent() {
         let mut frontier = Fixture::default();
         frontier.beat(0, 3.0);
         frontier.beat(5, 4.0);

@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn latest_missing_samples_are_kept() {
+    fn full_list_drops_the_oldest_missing_samples() {
         let mut lacks = MissingSamples::default();
         let lack = |x_m: f64| MissingSample { x_m, arc_m: 1.0, head: 0, why: Causes::of(Cause::HeadSilent) };
         for k in 0..2 * ROOM + 10 {
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn latest_missing_samples_of_one_head_are_reassigned() {
+    fn latest_missing_samples_of_a_head_get_the_new_cause() {
         let mut lacks = MissingSamples::default();
         let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
         for k in 0..ROOM + 100 {

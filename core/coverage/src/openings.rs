@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn declared_opening_is_no_hole_and_undeclared_one_is() {
+    fn only_an_undeclared_opening_counts_as_a_hole() {
         let profile = shapes::circle(3.0).unwrap();
         let hole = |with: bool, from_m: f64| {
             let store = store(&profile, with);
@@ -138,7 +138,7 @@ mod tests {
 
     /// Samples fill 2 m by 4 m every 5 cm, or every 2 cm for a target of 0.2 m.
     #[test]
-    fn number_of_filling_samples_equals_the_predicted_number() {
+    fn number_of_samples_filled_into_an_opening_equals_the_predicted_number() {
         let profile = shapes::circle(3.0).unwrap();
         for (target_m, expected) in [(0.8, 41 * 81), (0.2, 101 * 201)] {
             let layout = StoreLayout {

@@ -120,7 +120,7 @@ mod tests {
 
     /// The error is two standard deviations of 0.05 m.
     #[test]
-    fn alternative_target_keeps_errors_and_doubts_of_the_section() {
+    fn verdict_for_another_target_respects_position_error_and_doubtful_samples() {
         let mut seen = Seen::new();
         let of = |seen: &Seen, index: i64, target_m: f64| {
             seen.sections.verdicts_at(target_m, &seen.outlook).find(|(at, _)| *at == index).unwrap().1

@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_vehicle_is_a_phase_cause_only_if_the_planned_speed_helps() {
+    fn slow_vehicle_counts_as_out_of_phase_only_if_the_planned_speed_helps() {
         let slow = Drive {
             speed_mps: 0.08,
             planned_mps: 0.1,
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn larger_error_is_kept_in_any_order() {
+    fn largest_pass_error_is_kept_in_any_order() {
         for order in [[0.01, 0.05, 0.02], [0.05, 0.02, 0.01], [0.01, 0.02, 0.05]] {
             let mut worst = PassError::default();
             for sd_m in order {
@@ -272,14 +272,14 @@ mod tests {
     }
 
     #[test]
-    fn drive_with_the_larger_distance_between_passes_is_kept() {
+    fn worse_drive_has_the_larger_distance_between_passes() {
         let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
         assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
         assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));
     }
 
     #[test]
-    fn yaw_error_moves_wall_beside_the_vehicle_but_not_above_it() {
+    fn yaw_error_displaces_wall_beside_the_vehicle_but_not_above_it() {
         let yaw = Relative::new([[0.0; 3], [0.0; 3], [0.0, 0.0, 1e-4]]);
         let error = PassError { relative: yaw, from_m: [0.5, 1.0] };
         let profile = shapes::circle(3.0).unwrap();

@@ -242,7 +242,7 @@ mod tests {
 
     /// A head that fails late is outvoted within one or two turns, but not by a few bins.
     #[test]
-    fn ballot_halves_old_votes() {
+    fn head_that_fails_late_is_outvoted_within_two_turns() {
         let wrong = PlacedReturn { x_m: 7.0, arc_m: 0.0, off_m: -0.5 };
         let mut ballot = Ballot::default();
         (0..1027).for_each(|_| ballot.add(None));

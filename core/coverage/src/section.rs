@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn fail_raises_the_flag_pass_clears_it_and_fail_raises_it_again() {
+    fn flag_is_raised_by_fail_cleared_by_pass_and_raised_again() {
         let mut section = Section::default();
         for (at, verdict, expected, is_flagged) in [
             (1, Verdict::Open, Judgement::Updated, false),
@@ -320,7 +320,7 @@ mod tests {
 
     /// An open section is unsure only if it is at an end of the coverage extent.
     #[test]
-    fn open_section_is_unsure_only_at_an_end_of_the_coverage_extent() {
+    fn undecided_section_is_unsure_only_at_an_end_of_the_coverage_extent() {
         let unsure = |not_inspected| Section { not_inspected, ..Section::default() }.unsure();
         assert_eq!([unsure(true), unsure(false)], [Some(Unsure::NotInspected), None]);
     }

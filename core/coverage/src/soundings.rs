@@ -159,7 +159,7 @@ mod tests {
     proptest! {
         /// The expected counts come from the samples within each node's edges.
         #[test]
-        fn each_node_counts_the_samples_within_its_edges(
+        fn each_grid_node_counts_the_samples_within_its_edges(
             samples in proptest::collection::vec((-3.0f64..19.0, 0.0f64..7.3), 0..400),
             from_m in -3.0f64..10.0,
             length_m in 0.0f64..8.0,
@@ -187,7 +187,7 @@ mod tests {
 
         /// Consecutive stretches contain each node exactly once.
         #[test]
-        fn consecutive_stretches_contain_each_node_once(section_m in 0.1f64..3.0) {
+        fn consecutive_stretches_contain_each_grid_node_once(section_m in 0.1f64..3.0) {
             let soundings = soundings(&[]);
             let parts: u32 = (0..6)
                 .map(|k| soundings.summary(section_m * f64::from(k), section_m * f64::from(k + 1)).nodes)
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn full_grid_does_not_exclude_a_missed_strip() {
+    fn grid_nodes_can_all_have_samples_despite_a_missed_strip() {
         // Two passes run along the edges of each row of nodes. Every node has ten samples, but the strip of 0.4 m
         // between the passes has none.
         let passes = (0..20).flat_map(|k| [0.05, 0.45].map(|x_m| f64::from(k) * 0.5 + x_m));
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_outside_are_not_counted_and_counts_saturate() {
+    fn samples_outside_the_grid_are_not_counted_and_counts_saturate() {
         let mut soundings = soundings(&[]);
         for (x_m, arc_m) in [(-3.3, 0.0), (20.1, 0.0), (f64::NAN, 0.0), (0.0, f64::NAN), (0.0, f64::INFINITY)]
         {

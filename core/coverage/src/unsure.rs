@@ -201,7 +201,7 @@ mod tests {
 
     /// A section with a large error does not represent the others, whatever the size of its hole.
     #[test]
-    fn stretch_is_represented_by_the_majority_of_its_sections() {
+    fn unsure_stretch_is_represented_by_the_majority_of_its_sections() {
         let lost = |section| Stretch::one(Unsure::Position, section, [0.9, 1.4, 0.7], Driven::default());
         let mut stretch = lost(0);
         assert!(stretch.is_mostly_error());

@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn visits_of_one_navigation_stretch_are_related() {
+    fn visits_are_related_unless_navigation_was_interrupted_between_them() {
         let flags = |noted: &[(u32, u32, u64)]| {
             let visits = after(noted);
             (visits.newest(), visits.are_several(), visits.are_unrelated())

@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn constant_design_range_and_changing_range_are_not_stuck() {
+    fn constant_range_expected_by_the_design_and_changing_range_are_not_stuck() {
         assert!(!after((0..1000).map(|_| (1.0, 1.0))).is_stuck(8, 0.05));
         assert!(!after((0..1000).map(|k| (1.0 + 0.003 * f64::from(k), 1.0))).is_stuck(2, 0.05));
     }

@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn sd_grows_by_at_most_turn_sd_per_metre_of_arm() {
+    fn sd_grows_by_at_most_the_rotation_sd_per_metre_of_lever_arm() {
         let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
         let arm = |k: u32| Vec3::new(0.0, math::sin(f64::from(k)), math::cos(f64::from(k)));
         let adds_m = |k: u32| relative.sd_m(arm(k).scaled(51.0)) - relative.sd_m(arm(k).scaled(50.0));

@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wrap_shortcuts_give_the_same_bits_as_the_quotient() {
+    fn wrap_shortcuts_are_bit_identical_to_the_full_formula() {
         let by_quotient = |value: f64, modulus: f64| {
             let r = value - modulus * libm::floor(value / modulus);
             if r >= modulus || r < 0.0 { 0.0 } else { r }

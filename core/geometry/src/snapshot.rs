@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn error_of_a_foreign_snapshot_names_the_part() {
+    fn error_about_a_snapshot_of_another_vehicle_names_the_part() {
         let bytes = saved(&machine("a", &[1, 2, 3]));
         let mut from = Restorer::new(&bytes);
         from.part("machine").unwrap();

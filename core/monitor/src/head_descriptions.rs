@@ -100,7 +100,7 @@ pub(crate) mod tests {
 
     /// A mode is named if all heads have it. A range is named if it is long enough for all heads.
     #[test]
-    fn only_settings_common_to_all_heads_are_named() {
+    fn settings_are_named_only_if_they_suit_all_heads() {
         let head = |finer: &str, longer_m: f64| HeadSettings {
             name: String::new(),
             finer: Some(ModeName::new(finer)),

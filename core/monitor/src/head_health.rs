@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn head_off_the_design_is_deaf_if_another_detects_the_wall() {
+    fn head_contradicting_the_design_is_deaf_if_another_head_detects_the_wall() {
         let elsewhere = hearing(1200, |ping| Some(ping < 400));
         let [hears, does_not] = [hearing(1200, |_| Some(true)), hearing(1200, |_| Some(false))];
         assert!(elsewhere.is_deaf([does_not.elsewhere(), hears.elsewhere()].into_iter()));

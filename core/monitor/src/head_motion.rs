@@ -221,7 +221,7 @@ mod tests {
     /// After a restart, or after somebody has turned the head by hand, earlier pings are no longer used. The
     /// angle between the two places doesn't count as turned.
     #[test]
-    fn restart_at_a_distant_angle_adds_no_turned_angle() {
+    fn head_restart_at_a_distant_angle_does_not_count_as_turning() {
         for gap_ms in [20, 60, 1500, 60_000] {
             for jump_deg in [-170, -60, -20, 20, 60, 170] {
                 for way in [0.9, -0.9] {

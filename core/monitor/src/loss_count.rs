@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn all_losses_count_until_enough_pings_are_counted() {
+    fn upper_bound_counts_all_losses_until_enough_pings_arrived() {
         let mut count = LossCount::default();
         let mut at_most = |pings: std::ops::Range<u32>| {
             for ping in pings {
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn wall_silent_turn_after_turn_is_not_lost_by_chance() {
+    fn wall_without_returns_in_successive_turns_is_no_random_loss() {
         let grazing = turned(8000, |ping| ping % 400 < 120);
         assert!(grazing.share <= 0.0, "{grazing:?}");
         let both = turned(8000, |ping| ping % 400 < 120 || chance(ping, 5));
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn deaf_head_loses_over_nine_tenths_after_some_turns() {
+    fn loss_rate_of_a_deaf_head_exceeds_90_percent() {
         let deaf = turned(24_000, |ping| ping >= 4000);
         assert!(deaf.share > 0.9 && deaf.after_lost > 0.9, "{deaf:?}");
         // A few losses in the second turn hardly count.

@@ -415,7 +415,7 @@ mod tests {
 
     /// The digest depends neither on whether words are kept, nor on whether there is room for them.
     #[test]
-    fn digest_depends_only_on_the_words() {
+    fn digest_does_not_depend_on_whether_records_are_stored() {
         let mut plain = ResultStream::default();
         plain.record(RecordKind::Run).integer(7).integer(1);
         plain.record(RecordKind::Advice).integer(5).number(0.25).integer(0).integer(1).number(0.0);

@@ -324,7 +324,7 @@ mod tests {
 
     /// Each figure meets the rule x = q v T / s with the other two, and q is the nearest whole number.
     #[test]
-    fn each_hull_rule_figure_fits_the_other_two() {
+    fn each_hull_rule_figure_satisfies_the_rule_with_the_other_inputs() {
         for (apart_m, heads, speed_mps, turn_s, q) in
             [(0.6, 4, 0.1, 8.0, 3), (1.1, 2, 0.14, 7.3, 2), (0.05, 3, 0.2, 28.0, 1), (2.0, 3, 0.09, 5.5, 12)]
         {

@@ -257,7 +257,7 @@ mod tests {
 
     /// At any speed, errors measured at another speed give the same margin as errors measured at that speed.
     #[test]
-    fn margin_is_independent_of_the_speed_of_measurement() {
+    fn margin_does_not_depend_on_the_speed_at_which_errors_were_measured() {
         let sure = RemainingTarget {
             target_m: 0.5,
             confidence_sd: 2.0,

@@ -232,7 +232,7 @@ mod tests {
 
         /// The mean of Eq. 8 equals the mean of its terms.
         #[test]
-        fn mean_step_equals_the_mean_of_its_terms(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
+        fn mean_step_equals_the_mean_of_the_single_steps(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
             let m = u32::try_from(headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1).unwrap_or(0);
             prop_assume!(m >= 1);
             let sum: f64 = (1..=m).map(|k| t_y2_m(h, step, k).unwrap()).sum();

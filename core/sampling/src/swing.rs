@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn swing_counts_fully_above_a_continuous_transition() {
+    fn small_swing_is_attenuated_continuously_and_large_swing_counts_fully() {
         let ramp = |rad: f64| {
             let (looks, now) = looks(40.0, move |t| [rad * math::sin(TAU * t / 4.0), 0.0]);
             looks.swing(now, 2.0, 0.0).rate_radps * 2.0
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn pitch_counts_like_yaw_and_long_gaps_use_the_oldest_direction() {
+    fn pitch_swing_counts_and_gaps_beyond_the_history_use_its_oldest_direction() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
         // The largest rotation is from the oldest stored direction to the one farthest from it.

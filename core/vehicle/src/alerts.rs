@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn timing_is_set_for_the_named_class_only() {
+    fn alert_timing_changes_only_for_the_named_class() {
         let all = timing("speed.hold_s = 2.5\n[position]\noff_s = 0\n").unwrap();
         let usual = AlertTiming::default();
         let speed = ClassTiming { hold: DurNs(2_500_000_000), ..usual.of(AlertClass::Speed) };
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_are_in_metres_and_minutes() {
+    fn cable_limit_is_in_metres_and_dive_limit_in_minutes() {
         let limits = |text: &str| {
             let section = Document::new("vehicle.toml", text).root().unwrap();
             LimitsConfig::parse(&section).map_err(|error| error.to_string())

@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_method_is_off_the_front() {
+    fn method_slower_and_no_more_accurate_is_off_the_pareto_front() {
         let mut points = [
             point("fine", 0.01, [9.0, 10.0, 11.0]),
             point("fine but slow", 0.01, [90.0, 100.0, 110.0]),
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_keeps_equal_settings_on_the_front() {
+    fn settings_equal_within_noise_are_both_on_the_pareto_front() {
         let mut points = [point("a", 0.01, [9.0, 10.0, 11.0]), point("b", 0.01, [9.5, 10.4, 11.5])];
         assert_eq!(on_front(&mut points), ["a", "b"]);
     }

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_equal_the_planted_ones() {
+    fn verdict_errors_equal_the_errors_planted_in_the_test_data() {
         let dive = vec![
             judged(0.4, Some(true), 0.4),
             judged(0.4, Some(true), 0.6),

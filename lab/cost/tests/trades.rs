@@ -39,7 +39,7 @@ fn is_whole(trade: &Trade) {
 }
 
 #[test]
-fn filter_beats_the_cable_and_each_knob_has_an_effect() {
+fn filter_is_more_accurate_than_the_cable_and_each_setting_has_an_effect() {
     let trade = measured(navigation::measure);
     is_whole(&trade);
     let of = |scene: &str, value: &str, name: &str| figure(&trade, [scene, "method", value], name);
@@ -89,7 +89,7 @@ fn ticks_change_no_verdict_but_coarse_profiles_change_the_advice() {
 }
 
 #[test]
-fn leaving_nothing_out_changes_nothing_and_rays_converge() {
+fn result_without_omitted_effects_is_unchanged_and_converges_with_more_rays() {
     let trade = measured(simulation::measure);
     is_whole(&trade);
     for scene in ["boulders", "small pipe"] {
@@ -119,7 +119,7 @@ fn leaving_nothing_out_changes_nothing_and_rays_converge() {
 
 /// Confidence has a price: at k standard deviations sigma, the plan is for a hole of T - k (sigma - 2 mm).
 #[test]
-fn hours_with_confidence_equal_hours_with_a_smaller_target() {
+fn survey_hours_with_confidence_equal_those_with_a_smaller_target() {
     let trade = measured(sureness::measure);
     is_whole(&trade);
     let inputs = inputs();

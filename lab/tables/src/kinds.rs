@@ -17,7 +17,7 @@ pub const KINDS: [&dyn DeviceKind; 7] = [
 mod tests {
     /// The two lists can't be shared: the command's crate would add its terminal, page and ports as dependencies.
     #[test]
-    fn device_kinds_equal_those_of_the_command() {
+    fn device_kinds_equal_those_of_the_headrace_command() {
         let lines = |text: &str| -> Vec<String> {
             let kinds = text.lines().map(str::trim).filter(|line| line.starts_with("&headrace_"));
             kinds.map(str::to_owned).collect()

@@ -335,7 +335,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn other_lines_are_accepted_without_a_reading() {
+    fn lines_other_than_velocity_reports_are_accepted_without_a_reading() {
         let mut codec = LineCodec::default();
         let lines = [POSITION, RESPONSE, "{}\n", EXAMPLE].concat();
         assert_eq!(decode_all(&mut codec, lines.as_bytes()).len(), 1);

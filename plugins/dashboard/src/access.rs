@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn distinct_tokens_are_read_from_cookies_bearer_and_query() {
+    fn tokens_are_read_once_each_from_cookies_bearer_header_and_query() {
         let tokens = |pairs: &[(header::HeaderName, &str)], uri: &'static str| {
             let headers = pairs.iter().map(|(name, value)| (name, HeaderValue::from_str(value).unwrap()));
             let mut map = HeaderMap::new();

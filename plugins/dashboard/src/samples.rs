@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn sample_ranges_span_chunks_and_are_thinned() {
+    fn sample_queries_span_several_chunks_and_are_thinned() {
         let samples = filled(200_000);
         let (some, step) = samples.between(64.9, 66.1, 200_000);
         assert_eq!((some.len(), step, some[0].t_ms), (1201, 1, 64_900));

@@ -397,7 +397,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn latency_of_a_ping_period_is_refused() {
+    fn latency_as_long_as_the_ping_period_is_refused() {
         let root = Document::new("v.toml", "mode = \"slow\"\nlatency_ms = 18").root().unwrap();
         let late = SensorConfig { latency: DurNs::from_millis(18), ..sensor() };
         let error = Settings::read(&late, &root).unwrap_err().to_string();

@@ -324,7 +324,7 @@ fn sbg_values_with_bad_status_are_withheld() {
 }
 
 #[test]
-fn first_kind_of_sbg_time_is_followed() {
+fn only_the_first_received_kind_of_sbg_time_is_followed() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
     assert_eq!(decoder.clock(), None);
     let info = |time_us| sbg::Message::ImuInfo { time_us, status: sbg::ALL_WELL, temperature: 0 };

@@ -223,7 +223,7 @@ fn wire_axes_are_converted() {
 }
 
 #[test]
-fn each_part_uses_only_its_own_messages() {
+fn each_sensor_kind_uses_only_its_own_mavlink_messages() {
     let line = [RECORDED_ATTITUDE, RECORDED_RAW_IMU, RECORDED_PRESSURE].concat();
     for (part, readings, passed_over) in [
         (RAW_IMU, 3, 1),

@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn every_event_is_one_write_and_unplug_returns_the_writer() {
+    fn each_uhid_event_is_one_write_and_the_device_can_be_replugged() {
         let mut events = Events { taken: Vec::new(), most: usize::MAX };
         let mut device = VirtualDevice::plug(&mut events, &COUNTER).unwrap();
         device.report(&[1; 11]).unwrap();

@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn worked_example_3_wraps_the_short_way() {
+    fn worked_example_3_wraps_to_the_smaller_difference() {
         assert_eq!(Width::Bits16.difference(65_530, 4), 10);
         assert_eq!(Width::Bits16.difference(3, 65_533), -6);
         assert_eq!(Width::Bits8.difference(250, 6), 12);

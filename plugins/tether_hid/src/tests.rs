@@ -87,7 +87,7 @@ fn round_trip(own: &str, decoder: &mut dyn Decoder, zero_at_m: f64, scale: f64, 
 }
 
 #[test]
-fn worked_example_1_is_61_728_m_below_zero() {
+fn worked_example_1_gives_a_length_of_minus_61_728_m() {
     let mut decoder = HidDecoder::new(reference_counter()).unwrap();
     let report = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
     let readings = decode(&mut decoder, MonoNs(5_000_000), &report);

@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn restart_from_zero_is_marked_with_or_without_absence() {
+    fn count_restarted_from_zero_is_marked_with_or_without_prior_silence() {
         for (silence_ms, was_away) in [(20, false), (60_000, true)] {
             let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
             tracker.take(at_ms(0), &counted(120_000));
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn reports_that_arrive_together_are_not_too_fast() {
+    fn reports_received_at_the_same_time_are_not_rejected_as_too_fast() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         for report in 0..50 {
             let total = tracker.take(at_ms(1000), &counted(report * 120));

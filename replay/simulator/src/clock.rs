@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shown_and_true_times_are_inverse() {
+    fn conversions_between_device_and_true_time_are_inverse() {
         for ppm in [-1000.0, -3.7, 0.0, 1e-6, 20.0, 999.9] {
             let clock = Clock::slow_by_ppm(ppm);
             for after in [0, 1, 17, 999_999_999, 1_000_000_007, 36_000_000_000_000] {

@@ -17,7 +17,7 @@ fn json(folder: &Folder, args: &[&str]) -> Value {
 }
 
 #[test]
-fn plan_text_of_a_vehicle() {
+fn plan_of_a_vehicle_is_printed_as_text() {
     let answer = plan(&Folder::new(), &["--vehicle", VITA_2]);
     assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
     insta::assert_snapshot!(answer.stdout, @r"
@@ -48,7 +48,7 @@ fn plan_text_of_a_vehicle() {
 }
 
 #[test]
-fn plan_text_with_drift_yaw_and_a_deadline() {
+fn plan_with_drift_yaw_and_deadline_is_printed_as_text() {
     let args = ["--tunnel", "ceran", "--length", "7000", "--heads", "2", "--layout", "sector_offset"];
     let allowed = ["--target", "0.6", "--drift", "1", "--yaw", "10", "--hours", "30", "--range", "20"];
     let answer = plan(&Folder::new(), &[&args[..], &allowed].concat());

@@ -161,7 +161,7 @@ fn reported_cause_is_the_injected_one() {
 /// Heads that are apart along the hull are in phase near the planned speed. A section can therefore fail below this
 /// speed and pass at it. The cause is then the phase.
 #[test]
-fn failed_section_that_only_a_higher_speed_mends_is_attributed_to_phase() {
+fn section_that_passes_only_at_a_higher_speed_fails_because_of_phase() {
     let driven = |speed_mps: f64| {
         let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml");
         let scene = format!(

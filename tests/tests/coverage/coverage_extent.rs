@@ -127,7 +127,7 @@ fn legs(distances_m: &[f64]) -> Report {
 }
 
 #[test]
-fn start_and_turning_point_get_no_flag_and_no_default_pass() {
+fn wall_beyond_start_and_turning_point_is_open_without_a_flag() {
     let report = legs(&[9.0, -4.0]);
     accounted_for("there and back", &report);
     let front_m = START_M + HEAD_M;
@@ -344,7 +344,7 @@ fn dive_mostly_without_a_position_exits_with_1() {
 /// Samples from before the position estimate has converged don't affect later sections. A vehicle that waits for a
 /// known heading loses only the metres that its front heads sampled while it waited.
 #[test]
-fn waiting_for_a_known_heading_leaves_no_undecided_metre() {
+fn waiting_for_a_known_heading_leaves_at_most_25_cm_undecided() {
     let vehicle = VEHICLE.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.09");
     assert_ne!(vehicle, VEHICLE);
     let scene = format!(

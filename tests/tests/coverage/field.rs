@@ -88,7 +88,7 @@ fn initial_stop_gives_earlier_verdicts() {
 
 /// If every verdict is pass, all false passes are counted. If every verdict is fail, all false fails are counted.
 #[test]
-fn figures_count_false_verdicts() {
+fn field_statistics_count_all_false_passes_and_false_fails() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let cell = Cell {
         vehicle,

@@ -126,7 +126,7 @@ fn no_flag_is_cleared_without_turning_back() {
 }
 
 #[test]
-fn flagged_sections_are_failed_sections_at_exact_positions() {
+fn every_flagged_section_fails_if_positions_are_exact() {
     every_flag(
         |judged| forward(judged) && direct(judged),
         |_, _, due| {

@@ -5,7 +5,7 @@ use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
 const DIVES: u64 = 50;
 
 #[test]
-fn removing_the_reported_cause_passes_the_section() {
+fn section_passes_after_removing_the_reported_cause() {
     let mut matrix = Matrix::default();
     let threads = 2;
     let of_thread = |thread: u64| -> Vec<_> {

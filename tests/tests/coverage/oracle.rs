@@ -51,7 +51,7 @@ fn random_dives_cover_every_verdict() {
 }
 
 #[test]
-fn sample_lies_on_the_design_along_its_reference_ray() {
+fn sample_lies_on_the_design_wall_along_its_reference_ray() {
     for (seeded, dive) in DIVES.iter() {
         for Sample { place, point } in dive.samples() {
             let off_m = dive.profile.arc_of([point[1], point[2]]) - place[1];

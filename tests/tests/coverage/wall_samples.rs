@@ -190,7 +190,7 @@ fn sound_heads_are_accepted_in_a_wider_pipe_and_while_swaying() {
 }
 
 #[test]
-fn sections_passed_in_murk_have_true_holes_within_the_target() {
+fn sections_passed_in_murky_water_have_true_holes_within_the_target() {
     let heads = "sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\"]";
     let near =
         format!("outliers = {{ share = 0.05, near_m = 0.1, far_m = 0.8, {heads} }}\nmultipath = {{}}\n");

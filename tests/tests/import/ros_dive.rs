@@ -161,7 +161,7 @@ fn recording(messages: &[Message<'_>]) -> Vec<u8> {
 }
 
 #[test]
-fn imported_ros_recording_gives_the_same_dive() {
+fn imported_ros_recording_gives_the_dive_it_was_made_from() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let messages = raw_messages(&dive);

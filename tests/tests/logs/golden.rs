@@ -22,7 +22,7 @@ fn names(ending: &str) -> Vec<String> {
 }
 
 #[test]
-fn golden_logs_replay_to_their_reports_and_words() {
+fn golden_logs_replay_to_their_reports_and_printed_text() {
     let mut settings = insta::Settings::clone_current();
     settings.set_snapshot_path(folder());
     settings.set_prepend_module_to_snapshot(false);

@@ -284,7 +284,7 @@ fn seeking_over_damage_reports_the_same_losses_as_a_straight_replay() {
 }
 
 #[test]
-fn ending_before_seen_damage_still_reports_it() {
+fn damage_seen_before_seeking_back_is_reported_at_the_end() {
     let folder = logs();
     damage(&folder, "ticks.mcap");
     let losses = |lines: &str| {

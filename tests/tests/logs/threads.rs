@@ -307,7 +307,7 @@ fn loops_that_share_a_navigation_give_the_same_results_as_alone() {
 }
 
 #[test]
-fn loops_with_different_placement_cannot_share_a_navigation() {
+fn loops_with_different_mission_settings_cannot_share_a_navigation() {
     let scene = scene();
     let (mut first, mut other) = (scene.vehicle.mission(), scene.vehicle.mission());
     (first.length_m, other.site.sound_speed_mps) = (50.0, first.site.sound_speed_mps + 1.0);

@@ -109,7 +109,7 @@ const LATE_HEAD: &str = "line_delay = { sensors = [\"front\"], latency_ms = 50 }
 
 /// The errors are a rotated head, a reversed head, a wrong zero of the counter, and a late inertial unit.
 #[test]
-fn calibrate_finds_and_offers_wrong_settings() {
+fn calibrate_finds_wrong_settings_and_proposes_corrections() {
     let front = "position_m = [0.1, 0, 0.04]\nangles_deg = [4, 0, 0]";
     let truth = vehicle(front, "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 0]", 1.5);
     let folder = folder(true, &truth, LATE_UNIT);

@@ -62,7 +62,7 @@ const LEAST_APART: f64 = 0.8;
 
 /// If heads are apart along the hull, neighbouring passes are made at quite different times.
 #[test]
-fn holes_of_heads_apart_along_the_hull_are_within_their_bounds() {
+fn hole_errors_of_heads_apart_along_the_hull_are_within_reported_bounds() {
     let mut all = Vec::new();
     for (seed, slack) in [(1, "reach_m = 0.03, period_s = 10"), (2, "reach_m = 0.05, period_s = 30")] {
         let text = format!(
@@ -234,7 +234,7 @@ fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
 /// Each sensor is lost temporarily in one dive and permanently in another. The error must stay within its reported
 /// bounds.
 #[test]
-fn silent_sensors_keep_the_error_within_its_bounds() {
+fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
     for (name, sources) in [
         ("the head", vec![0]),
         ("the left echosounder", vec![1]),

@@ -164,7 +164,7 @@ fn voice_note_has_its_start_time_and_its_bytes_in_the_log() {
 }
 
 #[test]
-fn notes_writes_voice_files_and_overwrites_nothing() {
+fn notes_command_writes_voice_files_and_overwrites_nothing() {
     let folder = Folder::new();
     let serving = demo(&folder, &[]);
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();

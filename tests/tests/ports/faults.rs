@@ -412,7 +412,7 @@ impl Fault for DeafAtFirst {
 
 /// Each device waits for an answer that doesn't arrive, and sends nothing while the other device waits.
 #[test]
-fn two_devices_on_a_line_with_lost_first_answers_wait_one_answer_timeout() {
+fn two_devices_on_one_line_start_although_first_answers_are_lost() {
     let end = End::tcp();
     let beside = End::beside(&end);
     let second = "plugin = \"ping1d\"\ninterval_ms = 50\ndevice_id = 2\n";

@@ -231,7 +231,7 @@ fn blocks_of_64_bytes_lose_nothing() {
 }
 
 #[test]
-fn late_messages_give_the_same_readings() {
+fn delays_between_messages_do_not_change_the_readings() {
     let mut random = Random(23);
     for text in MESSAGES {
         let frames = frames(device(text).as_ref(), &mut random);

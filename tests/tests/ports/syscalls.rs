@@ -51,7 +51,7 @@ fn calls(trace: &str) -> (Vec<&str>, usize) {
 }
 
 #[test]
-fn armed_tick_makes_no_system_call() {
+fn tick_of_a_running_loop_makes_no_system_call() {
     let folder = Folder::new();
     let trace = folder.path("trace");
     let traced = |program: &std::path::Path, arguments: &[&str]| {
@@ -62,7 +62,8 @@ fn armed_tick_makes_no_system_call() {
         skipped("strace isn't there, or may not trace");
         return;
     }
-    let ticks = ["--exact", "syscalls::ticks_for_the_system_call_trace", "--ignored", "--test-threads=1"];
+    let ticks =
+        ["--exact", "syscalls::ticks_run_under_the_system_call_trace", "--ignored", "--test-threads=1"];
     let output = traced(&std::env::current_exe().unwrap(), &ticks).unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
     let trace = std::fs::read_to_string(&trace).unwrap();
@@ -73,8 +74,8 @@ fn armed_tick_makes_no_system_call() {
 }
 
 #[test]
-#[ignore = "armed_tick_makes_no_system_call runs it"]
-fn ticks_for_the_system_call_trace() {
+#[ignore = "tick_of_a_running_loop_makes_no_system_call runs it"]
+fn ticks_run_under_the_system_call_trace() {
     let scene = scenes::scene(SCENE);
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

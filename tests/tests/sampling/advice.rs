@@ -245,7 +245,7 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
 /// Sections are missed at a speed a third above the advice. The speed for repeating them must be near the advice,
 /// because both numbers are on one screen.
 #[test]
-fn repeat_speed_of_a_missed_section_is_near_the_advice() {
+fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
     let coarse = Case { mode: "faster", ..FOUR };
     for case in [VITA1, FOUR, sectors(TWO, 0.9), sectors(FOUR, 0.5), sectors(FOUR, 0.7), sectors(coarse, 0.5)]

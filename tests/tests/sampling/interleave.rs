@@ -245,7 +245,7 @@ fn phase_shifted_heads_pass_each_angle_at_equal_distances() {
 }
 
 #[test]
-fn sectors_are_swept_at_two_alternating_distances_in_phase() {
+fn heads_in_sectors_sweep_in_phase_at_two_alternating_distances() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;

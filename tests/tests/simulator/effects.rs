@@ -133,7 +133,7 @@ fn only_named_effects_have_systems_components_and_streams() {
 
 /// Effects that a scene calls for are listed with their reasons. They are simulated only if the scene requests it.
 #[test]
-fn called_effects_are_listed_and_simulated_only_on_request() {
+fn implied_effects_are_listed_with_reasons_and_simulated_only_on_request() {
     let folder = folder();
     let names = |list: &Value| -> Vec<String> {
         let of = |entry: &Value| entry["effect"].as_str().unwrap().to_owned();
@@ -168,7 +168,7 @@ fn called_effects_are_listed_and_simulated_only_on_request() {
 /// The report must show no influence for one effect, and a large one for another. The price of an effect is its CPU
 /// time.
 #[test]
-fn explained_worth_separates_effects_with_influence_from_others() {
+fn explain_worth_shows_which_effects_change_the_result() {
     let folder = folder();
     let effects = "motion_within_turn = {}\nimu_noise = { gyro_degps_rthz = 1e-7 }\nmissing_returns = { share = 0.5, mean_run = 9 }";
     folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));

@@ -171,7 +171,7 @@ fn both_causes_are_named_only_if_both_are_needed() {
 ///
 /// Without the other two factors, the section would pass despite the phase.
 #[test]
-fn two_sufficient_causes_of_three_present_are_named() {
+fn only_two_causes_are_named_if_removing_two_of_three_suffices() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let drive = Drive { speed_mps: 0.35, gap_s: 2.4, healthy_gap_s: 2.4, ..sound() };
     let wall =
@@ -183,7 +183,7 @@ fn two_sufficient_causes_of_three_present_are_named() {
 ///
 /// If this distance exceeds the target, the setting alone does not explain the fail.
 #[test]
-fn longer_turn_must_leave_the_gap_between_passes_within_the_target() {
+fn setting_is_a_cause_only_if_its_longer_turn_meets_the_target() {
     let other = |turn: f64| OtherSettings { finer_step: 0.5, finer_turn: turn, longer_turn: turn };
     let drive = |turn: f64| Drive { other: other(turn), ..sound() };
     let far = |turn: f64| Wall {
@@ -204,7 +204,7 @@ fn longer_turn_must_leave_the_gap_between_passes_within_the_target() {
 
 /// A stalled head leaves the passes equally far apart, however straight the vehicle moves.
 #[test]
-fn stalled_head_leaves_wide_pass_gaps_without_swing() {
+fn stalled_head_and_swing_are_both_named_as_causes() {
     let why = Causes::of(Cause::HeadStalled);
     let drive = Drive { swing_m: 0.4, gap_s: 4.0, gap_at_plan_s: 4.0, ..sound() };
     let wall = Wall { along_m: 0.78, bare: Some([[9.0, 11.3], [3.0, 6.0]]), why, drive, ..Wall::default() };
@@ -213,14 +213,14 @@ fn stalled_head_leaves_wide_pass_gaps_without_swing() {
 
 /// If heads never pinged, nothing else is known about them, so speed is not named as a cause.
 #[test]
-fn silence_is_named_if_no_head_pinged() {
+fn silent_heads_are_the_only_named_cause_if_no_head_pinged() {
     let fast = || Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { is_dark: true, ..fast() }), [Cause::HeadSilent]);
     assert_eq!(named(&fast()), [Cause::TooFast]);
 }
 
 #[test]
-fn cause_of_a_neighbour_is_preferred_if_sufficient() {
+fn cause_of_the_neighbouring_section_is_preferred_if_sufficient() {
     let wall = |beside: Cause| Wall {
         along_m: 0.7,
         drive: Drive { speed_mps: 0.26, planned_mps: 0.1, planned_gap_s: 2.6, healthy_gap_s: 2.6, ..sound() },
@@ -241,7 +241,7 @@ fn cause_has_the_same_word_in_text_and_json() {
 
 /// The fitting distance is driven in the time of all needed passes and of one ping.
 #[test]
-fn speed_with_losses_leaves_time_for_all_needed_passes() {
+fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
     let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };
     assert!((drive.with_losses_mps(1.0) - 0.19).abs() < 1e-12);
     // The vehicle drives 0.4 m in the time of 1.5 passes of 2 s each and one ping.
@@ -253,7 +253,7 @@ fn speed_with_losses_leaves_time_for_all_needed_passes() {
 ///
 /// `drive` has this time as driven, as scheduled, without stalls, and at the planned speed.
 #[test]
-fn time_between_passes_depends_on_the_removed_causes() {
+fn expected_time_between_passes_depends_on_the_removed_causes() {
     let drive = Drive {
         healthy_gap_s: 4.0,
         planned_gap_s: 3.0,
@@ -305,7 +305,7 @@ fn time_between_passes_depends_on_the_removed_causes() {
 
 /// With a target of 0.5 m and steps of 0.3 m along the wall, 0.4 m remain along the tunnel.
 #[test]
-fn removed_speed_cause_gives_the_largest_speed_that_fits() {
+fn drive_has_the_largest_fitting_speed_after_removing_the_speed_cause() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
     let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
     // The vehicle drives 0.4 m in the time of one pass, 2 s, and one ping.
@@ -328,7 +328,7 @@ fn removed_speed_cause_gives_the_largest_speed_that_fits() {
 ///
 /// The planned speed helps only if distances shrink by more than the factor `HELPS`.
 #[test]
-fn removed_phase_cause_gives_the_planned_speed_if_this_speed_helps() {
+fn drive_has_the_planned_speed_after_removing_the_phase_cause_if_helpful() {
     let then = |planned_gap_s: f64| {
         let drive = Drive {
             speed_mps: 0.1,

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_put_back_fill_the_hole() {
+    fn added_samples_fill_the_hole() {
         let gone = |i: u32, k: u32| !(i == 10 && k == 4);
         let hole_m = 0.5;
         assert!(has(gone, 0.99 * hole_m, &WallChanges::NOTHING, &[]));
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn compressed_wall_has_smaller_holes() {
+    fn compressing_the_wall_makes_holes_smaller() {
         let all = |_, _| true;
         // The radius is half the diagonal of a mesh of 0.5 by 0.5 m, or of 0.25 by 0.5 m.
         for (otherwise, radius_m) in [
@@ -183,7 +183,7 @@ mod tests {
     ///
     /// Samples on both sides of the compressed stretch then bound the hole.
     #[test]
-    fn compressed_wall_includes_samples_beyond_the_uncompressed_radius() {
+    fn search_on_compressed_wall_includes_samples_from_farther_away() {
         let sides = |i: u32, _| i <= 8 || i >= 13;
         let otherwise = WallChanges { along: 0.3, ..WallChanges::NOTHING };
         assert!(has(sides, 0.44, &otherwise, &[]));
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn wall_is_mirrored_into_the_stretch_to_come() {
+    fn wall_is_mirrored_into_the_stretch_not_yet_sampled() {
         // On a compressed wall, a circle at the end of the samples extends ahead, where nothing has landed yet.
         let ends = |i: u32, _| i <= 10;
         let otherwise = WallChanges { along: 0.3, ..WallChanges::NOTHING };
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn stretch_and_its_mirror_image_exclude_the_gap_between_them() {
+    fn mirroring_a_stretch_gives_two_stretches_without_their_gap() {
         let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
             assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
         };
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn covered_stretch_is_no_hole() {
+    fn no_hole_is_found_in_a_stretch_counted_as_covered() {
         let behind = |i: u32, _| i <= 9;
         assert!(has(behind, 0.4, &WallChanges::NOTHING, &[]));
         let ahead = Some(Reach { from_m: 4.7, to_m: f64::INFINITY });

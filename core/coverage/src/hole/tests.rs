@@ -64,7 +64,7 @@ fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64)
 
 proptest! {
     #[test]
-    fn scattered_samples_agree_with_brute_force(
+    fn hole_of_scattered_samples_equals_a_brute_force_search(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
     ) {
         let hole = largest(PERIMETER_M, &samples, 0.0, 0.5);
@@ -102,7 +102,7 @@ proptest! {
     ///
     /// A verdict from these bounds equals the exact one, or is undecided if T lies between them.
     #[test]
-    fn bounds_of_a_tolerant_search_contain_the_hole(
+    fn bounds_of_a_search_with_tolerance_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
         tolerance_m in 0.0f64..0.5,
         target_m in 0.1f64..6.0,
@@ -121,7 +121,7 @@ proptest! {
 
     /// The bounds also hold with packed samples, because they include the displacement by packing.
     #[test]
-    fn bounds_after_packing_contain_the_hole(
+    fn bounds_with_packed_samples_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
     ) {
         let layout = StoreLayout { perimeter_m: PERIMETER_M, from_m: -20.0, to_m: 340.0, cell_m: 0.4, capacity: 1000 };
@@ -139,7 +139,7 @@ proptest! {
 
     /// The bounds also hold if a cell is so full that samples were thinned.
     #[test]
-    fn bounds_after_thinning_contain_the_hole(
+    fn bounds_with_thinned_samples_contain_the_exact_diameter(
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
     ) {
         let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
@@ -207,7 +207,7 @@ proptest! {
 }
 
 #[test]
-fn no_sample_in_reach_is_an_unbounded_hole() {
+fn hole_without_a_sample_in_reach_is_unbounded() {
     let empty = largest(PERIMETER_M, &[], 0.0, 0.25);
     assert!(!empty.bounded);
     let far = largest(PERIMETER_M, &[(35.0, 1.0)], 0.0, 0.25);
@@ -311,7 +311,7 @@ fn ideal_helices_have_the_reference_holes() {
 }
 
 #[test]
-fn samples_of_visits_before_the_first_counted_one_are_ignored() {
+fn samples_of_visits_before_the_requested_one_are_ignored() {
     let grid = |off_m: f64| {
         (0..60).flat_map(move |i| {
             (0..20).map(move |k| (f64::from(i) * 0.1 + off_m, f64::from(k) * PERIMETER_M / 20.0))
@@ -333,7 +333,7 @@ fn samples_of_visits_before_the_first_counted_one_are_ignored() {
 
 /// A hole that has grown, moved along or around the tunnel, or become unbounded is a different hole.
 #[test]
-fn holes_are_alike_within_a_centimetre_in_every_respect() {
+fn holes_are_alike_if_size_and_position_differ_by_under_1_cm() {
     let hole = Hole { diameter_m: 0.6, least_m: 0.6, most_m: 0.6, x_m: 7.0, arc_m: 3.0, bounded: true };
     let little = Hole { diameter_m: 0.609, x_m: 6.991, arc_m: 3.009, ..hole };
     assert!(hole.is_like(&little) && little.is_like(&hole));

@@ -103,7 +103,7 @@ impl Rig {
 }
 
 #[test]
-fn runs_grow_and_merge_and_are_cleared() {
+fn runs_of_failed_sections_grow_merge_and_are_cleared() {
     let mut rig = Rig::new();
     rig.say(10, Some(Cause::TooFast), 1.0);
     rig.say(11, Some(Cause::TooFast), 1.5);

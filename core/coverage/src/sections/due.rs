@@ -278,7 +278,7 @@ mod tests {
     /// This part measures up to twice the distance of the hole's centre. A hole that lies completely out of reach
     /// gets its final verdict.
     #[test]
-    fn hole_in_reach_is_judged_once_enough_of_it_is_out_of_reach() {
+    fn hole_is_judged_once_a_large_enough_part_is_out_of_reach() {
         let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
             alone(9, |section| {
                 (section.hole, section.hole_sd_m) = (Some(hole(diameter_m, x_m)), sd_m);
@@ -356,7 +356,7 @@ mod tests {
     ///
     /// The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn limit_of_an_empty_circle_includes_the_errors_at_its_place() {
+    fn limit_of_an_empty_circle_includes_the_position_error_at_its_place() {
         for is_beside in [true, false] {
             let fails = |circle_m: f64, errors: [f64; 2]| fails(circle_m, is_beside, errors, 10.9);
             assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "the circle must exceed the target");

@@ -25,7 +25,7 @@ fn stretch_contains_all_existing_sections_that_it_touches() {
 ///
 /// A section that is not judged counts as open.
 #[test]
-fn metres_are_counted_by_the_latest_verdicts() {
+fn each_section_counts_in_metres_once_by_its_latest_verdict() {
     let mut sections = sections();
     let [pass, fail] = [Verdict::Pass, Verdict::Fail].map(|verdict| Some(verdict as usize));
     for (before, now) in [(None, fail), (None, fail), (None, fail), (None, pass), (fail, pass), (fail, None)]
@@ -42,7 +42,7 @@ fn metres_are_counted_by_the_latest_verdicts() {
 ///
 /// A section without pings has the largest error of the sections within T / 2, and no other.
 #[test]
-fn section_without_pings_has_the_largest_error_nearby() {
+fn section_without_pings_takes_the_largest_position_error_nearby() {
     let error_of = |placed_in: i64, asked: i64| {
         let mut sections = sections();
         for (index, sd_m) in [(placed_in, 0.03), (30, 0.01)] {
@@ -99,7 +99,7 @@ fn verdict_requires_the_configured_number_of_standard_deviations() {
 }
 
 #[test]
-fn hole_in_reach_is_open_until_enough_of_it_is_out_of_reach() {
+fn verdict_stays_open_until_enough_of_the_hole_is_out_of_reach() {
     let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
     assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
     let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);
@@ -107,7 +107,7 @@ fn hole_in_reach_is_open_until_enough_of_it_is_out_of_reach() {
 }
 
 #[test]
-fn bounds_on_either_side_of_the_target_give_no_verdict() {
+fn no_verdict_is_given_if_the_hole_bounds_straddle_the_target() {
     let within = |diameter_m: f64, least_m: f64, most_m: f64| {
         verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, 0.5, BEHIND)
     };

@@ -99,7 +99,7 @@ proptest! {
     ///
     /// Steps are as short as those of real heads, so interpolation along a step doesn't amplify the error.
     #[test]
-    fn packed_passes_are_found_to_the_accuracy_of_packing(
+    fn nearest_pass_among_packed_samples_has_the_accuracy_of_packing(
         starts in proptest::collection::vec((0.0f64..12.0, 0.0f64..PERIMETER_M, -0.06f64..0.06), 1..8),
         place in (-1.0f64..13.0, 0.0f64..PERIMETER_M),
     ) {
@@ -186,7 +186,7 @@ proptest! {
 }
 
 #[test]
-fn pass_is_where_the_step_crosses_the_arc_length() {
+fn pass_position_is_interpolated_where_the_step_crosses_the_arc_length() {
     let mut store = store(&[sample(1.0, 7.2), sample(1.1, 0.2), sample(3.0, 7.2)]);
     // The step from (1.0, 7.2) to (1.3, 0.1) crosses the seam at its centre.
     let step = WallSample { step_m: Some([0.3, 0.2]), ..sample(1.3, 0.1) };
@@ -303,7 +303,7 @@ fn hundred_passes_back_and_forth_do_not_grow_memory() {
 }
 
 #[test]
-fn samples_keep_their_visits_when_packed() {
+fn packing_keeps_the_visit_number_of_each_sample() {
     let mut store = SampleStore::new(LAYOUT);
     let visited = |k: u32| WallSample {
         head: k as usize % 3,
@@ -327,7 +327,7 @@ fn samples_keep_their_visits_when_packed() {
 
 /// One stretch may hold as many samples as fit into all open bricks.
 #[test]
-fn stretch_that_fills_all_open_bricks_is_opened_again() {
+fn packed_stretch_that_fills_all_open_blocks_is_read_again() {
     let mut store = SampleStore::new(StoreLayout { capacity: 4, ..LAYOUT });
     for k in 0..4 {
         let at = f64::from(k);

@@ -298,7 +298,7 @@ mod tests {
     /// The running mean of white innovations has a standard deviation of 0.22. An innovation of constantly 1.5
     /// brings the mean to five times this value after 1.4 s. An innovation of constantly 1 never does.
     #[test]
-    fn biased_innovations_begin_a_dispute() {
+    fn cable_counter_is_disputed_after_biased_innovations() {
         let off = |sds: f64, sd_m: f64| {
             disputed_at(1.0, |t, reading| {
                 (reading.off_m, reading.sd_m) = (if t < 3.0 { 0.0 } else { sds * sd_m }, sd_m);
@@ -317,13 +317,13 @@ mod tests {
     }
 
     #[test]
-    fn unusual_motion_within_the_gate_begins_a_dispute() {
+    fn cable_counter_is_disputed_after_unusual_motion_within_the_gate() {
         let at_s = disputed_at(1.0, |t, reading| reading.is_usual = t < 4.0).unwrap();
         assert!((at_s - 4.0).abs() < 1e-9, "{at_s}");
     }
 
     #[test]
-    fn stationary_counter_is_disputed_only_on_a_lively_cable() {
+    fn stationary_counter_is_disputed_only_if_the_cable_slack_varies_strongly() {
         let stands = |is_lively: bool| {
             move |t: f64, reading: &mut CableReading| {
                 reading.shown_m = if t < 6.0 { reading.shown_m } else { 7.6 };
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn dispute_on_a_stationary_count_reverts_the_last_second() {
+    fn dispute_while_the_count_is_constant_reverts_the_last_second() {
         let mut cable = Cable::default();
         for k in 0..100_u32 {
             assert_eq!(cable.take(&reading(f64::from(k) / 10.0, 7.0, 0.0, 0.005)), Use::Fuse);
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn chainage_sd_equals_the_difference_of_counter_and_estimate() {
+    fn disputed_counter_difference_is_the_last_innovation_and_reported_after_1_s() {
         let mut cable = Cable::default();
         assert_eq!(cable.take(&reading(0.0, 7.0, 0.01, 0.005)), Use::Fuse);
         assert_eq!(cable.differs_m().to_bits(), 0.0_f64.to_bits());
@@ -386,7 +386,7 @@ mod tests {
     ///
     /// While the vehicle's own distance is uncertain, it is four tenths of the distance plus a centimetre.
     #[test]
-    fn dispute_ends_as_a_slip_once_the_counter_runs_like_the_vehicle() {
+    fn dispute_ends_as_a_slip_once_counter_and_vehicle_speeds_match() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [
             (1.0, 0.1, 0.0, 1.0, -0.4),
             (1.0, 0.2, 0.0, 1.0, -0.4),
@@ -410,7 +410,7 @@ mod tests {
     /// Beyond a difference of one metre, the estimate is given up if the counter runs. If the counter is stationary,
     /// the estimate is kept.
     #[test]
-    fn lost_estimate_restarts_from_a_running_counter() {
+    fn estimate_off_by_over_1_m_restarts_from_a_running_counter() {
         let (_, used) = ends(2.0, 0.3, 1.1).unwrap();
         let Use::Seek(lacking_m) = used else { panic!("{used:?}") };
         assert!(lacking_m > 1.1, "{lacking_m}");

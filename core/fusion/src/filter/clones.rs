@@ -209,7 +209,7 @@ mod tests {
     ///
     /// They do not become gradually more certain over the last 2 s before the return.
     #[test]
-    fn chainage_before_a_sudden_gain_in_certainty_stays_uncertain() {
+    fn soundings_before_a_silent_cable_returns_stay_uncertain() {
         let mut clones = ErrorClones::default();
         let mut factors = Factors::independent(core::array::from_fn(|_| 1.0));
         let at = |k: i64| MonoNs(0) + DurNs::from_millis(100 * k);

@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn dispute_on_a_changing_count_reverts_the_last_second() {
+    fn dispute_while_the_count_changes_reverts_the_last_second() {
         let mut corrections = stood(0, -0.002, [0.0; 2]);
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
@@ -157,7 +157,7 @@ mod tests {
 
     /// Even after a long stop, only the corrections of the last second are reverted.
     #[test]
-    fn dispute_after_a_long_stop_reverts_only_the_last_second() {
+    fn dispute_after_a_long_stop_reverts_only_the_last_second_of_corrections() {
         let [way_m, speed_mps] = stood(50, -0.002, [0.0; 2]).take_back();
         assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
     }
@@ -165,7 +165,7 @@ mod tests {
     /// The loss is the difference between the estimates with and without the counter. A speed correction adds
     /// distance to it.
     #[test]
-    fn speed_corrections_add_to_the_possible_loss() {
+    fn speed_corrections_add_to_the_possible_loss_of_distance() {
         let speeds = (0..50).map(|k| 0.002 * (lately() + f64::from(k)));
         let expected_m = 0.001 * (lately() + 49.0) + speeds.map(|speed| 0.1 * speed).sum::<f64>();
         let lost_m = stood(50, 0.002, [0.0; 2]).lost_m();
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn possible_loss_is_0_3_of_corrections_beyond_chance() {
+    fn possible_loss_of_distance_is_0_3_of_corrections_beyond_chance() {
         let sure = stood(50, 0.0, [0.0; 2]);
         assert!((sure.lost_m() - 0.3e-3 * (lately() + 49.0)).abs() < 1e-6, "{}", sure.lost_m());
         // The predicted standard deviation makes half of the corrections count as chance.
@@ -189,7 +189,7 @@ mod tests {
 
     /// After the first 20 s, corrections have the opposite sign, as for a hovering vehicle.
     #[test]
-    fn corrections_after_20_s_of_a_stop_add_no_loss() {
+    fn corrections_after_20_s_of_a_stop_add_no_possible_loss() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
         let first_m = corrections.lost_m();
         assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");
@@ -203,7 +203,7 @@ mod tests {
     /// The possible loss adds to the relative error between passes for one turn of a head. It adds to the error of the
     /// position permanently. A slow vehicle with coarse steps makes short stops, which do not count.
     #[test]
-    fn possible_loss_of_a_stop_remains_when_the_count_changes() {
+    fn possible_loss_during_a_long_stop_remains_after_the_count_changes() {
         for (readings, slips) in [(15, false), (50, true)] {
             let mut corrections = stood(readings, 0.0, [0.0; 2]);
             let before_m = corrections.lost_m();

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn step_larger_than_stated_is_recognised() {
+    fn counter_step_larger_than_stated_is_recognised() {
         for step_m in [0.005, 0.01, 0.0123, 0.025, 0.05] {
             for speed_mps in [0.05, 0.1, 0.2] {
                 let swaying = |t: f64| speed_mps * t + 0.1 * math::sin(0.3 * t);
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn recognised_step_is_at_least_the_stated_step() {
+    fn recognised_counter_step_is_at_least_the_stated_step() {
         for speed_mps in [0.003, 0.2] {
             let found_m = recognised_m(0.0005, 0.0005, |t| speed_mps * t + 0.02 * math::sin(0.4 * t));
             assert!((found_m - 0.0005).abs() < 1e-12, "{speed_mps}: {found_m}");
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn unchanged_counts_and_whole_steps_share_a_rounding_error() {
+    fn readings_on_the_same_count_or_whole_steps_share_a_rounding_error() {
         let mut step = CountStep::default();
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
         for k in 0..=20_u32 {
@@ -185,7 +185,7 @@ mod tests {
 
     /// The guess is a common step before the first movement, and then the smallest change so far.
     #[test]
-    fn step_is_guessed_before_the_first_block() {
+    fn counter_step_is_guessed_before_the_first_block_of_readings() {
         let mut step = CountStep::default();
         for k in 0..100 {
             step.hear(at(k), 3.0, 0.0005);

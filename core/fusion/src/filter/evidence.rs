@@ -207,7 +207,7 @@ mod tests {
 
     /// The gain of an alternative varies between blocks. The alternative is as certain as its mean gain.
     #[test]
-    fn certainty_of_an_alternative_follows_the_scatter_of_its_blocks() {
+    fn alternative_setting_is_less_certain_if_its_gain_scatters_between_blocks() {
         let sure_sd = |scatter_m2: f64| {
             let mut alternative = Alternative::default();
             for k in 0..8 {
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn parameter_with_negligible_effect_is_not_certain_despite_low_scatter() {
+    fn setting_with_negligible_effect_is_not_certain_despite_low_scatter() {
         assert!(alike(1.0, 0.05).certain(0.03).is_some());
         assert!(alike(0.2, 0.2).certain(0.03).is_some(), "ranges change by 6 mm, noise 3 cm");
         assert_eq!(alike(0.1, 0.2).certain(0.03), None, "ranges change by 3 mm");

@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn interleaved_noises_are_bit_identical_to_sequential_ones() {
+    fn adding_noise_terms_together_is_bit_identical_to_adding_them_singly() {
         let noises: [Noise; 9] = core::array::from_fn(|i| match i {
             7 => Noise::of_two(5, (2, -1.3), 0.11),
             8 => Noise::of_two(6, (5, 0.7), 0.2),

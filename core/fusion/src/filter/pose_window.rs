@@ -70,7 +70,7 @@ mod tests {
     /// In the first case, the pose has no effect on the parameter's fit. In the second case, both have the same
     /// effect.
     #[test]
-    fn residuals_that_the_pose_explains_are_removed() {
+    fn residuals_explained_by_a_pose_error_are_removed() {
         let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };
         let spell = |weight: f64| {
             let mut spell = PoseWindow::default();

@@ -102,7 +102,7 @@ mod tests {
 
     /// Passes add up while the vehicle is stationary. The count restarts after a short motion ahead or astern.
     #[test]
-    fn passes_accumulate_until_the_vehicle_moves_on() {
+    fn passes_over_a_bump_accumulate_until_the_vehicle_moves_on() {
         let settings = Settings::default();
         let mut seen = RepeatedBumps::default();
         let mut after = |returns: u32, x_m: f64| {

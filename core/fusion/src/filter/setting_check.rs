@@ -484,7 +484,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_misaligned_heads_have_an_angle() {
+    fn only_misalignment_settings_have_an_angle() {
         for by_rad in [0.05, -0.02] {
             for setting in
                 [Setting::HeadTurned(by_rad), Setting::HeadPitched(by_rad), Setting::HeadYawed(by_rad)]

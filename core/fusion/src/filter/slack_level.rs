@@ -383,7 +383,7 @@ mod tests {
     ///
     /// For the model, three standard deviations of its rate are compared with this.
     #[test]
-    fn lively_cable_gets_larger_and_faster_slack_than_declared() {
+    fn strongly_varying_cable_gets_larger_and_faster_slack_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
             let omega = math::TAU / period_s;
             let (level, _) = level_after(|t| amplitude_m * math::sin(omega * t));
@@ -395,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn stuck_counter_is_unusual_within_1_s() {
+    fn motion_of_a_stuck_counter_counts_as_unusual_within_1_s() {
         let sticks = |t: f64| {
             if (60.0..70.0).contains(&t) {
                 -0.2 * (t - 60.0)
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_without_inertial_data_count_as_usual() {
+    fn counter_readings_without_inertial_data_count_as_usual() {
         let (mut level, _) = level_after(|_| 0.0);
         level.begin(MonoNs(127_000_000_000));
         level.go_on(

@@ -215,7 +215,7 @@ mod tests {
     ///
     /// The vehicle is at rest once the cable has been stationary for twice the time between the last pulls.
     #[test]
-    fn vehicle_on_a_cable_wound_in_by_pulls_is_not_at_rest() {
+    fn vehicle_is_not_at_rest_between_pulls_of_the_cable() {
         let pulled = |speed_mps: f64, t: f64| 0.5 * math::floor_to_i64(2.0 * speed_mps * t) as f64;
         let mut stillness = RestDetector::default();
         let mut rested_s = 0_u32;

@@ -128,7 +128,7 @@ mod tests {
 
     /// Epochs arrive latest first. An epoch is due if it is at least one step before the epoch that was added last.
     #[test]
-    fn epoch_is_due_one_step_before_the_last_one() {
+    fn earlier_epoch_is_added_once_it_is_one_step_away() {
         let at = |s: u64| MonoNs(1_000_000_000 * s);
         let mut later = Later::default();
         assert!(later.is_due(at(100)));

@@ -196,7 +196,7 @@ fn smoothed_variances_are_never_negative_and_never_grow() {
 }
 
 #[test]
-fn step_encoded_as_a_record_parses_unchanged() {
+fn navigation_step_encoded_as_a_record_parses_unchanged() {
     let mut state = State::at_rest(Point3::new(1.0, -2.0, 3.0), Rot::from_roll_pitch_yaw(0.1, 0.2, 0.3));
     let mut leg = Leg::default();
     let felt = InertialSample {

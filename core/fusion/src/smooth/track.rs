@@ -298,7 +298,7 @@ mod tests {
     /// If the clock goes back by 10 s or more, the drive after the reset is used. Times before then belong to the
     /// old clock.
     #[test]
-    fn clock_reset_selects_the_drive_after_the_reset() {
+    fn track_navigation_uses_the_drive_after_a_clock_reset() {
         let mut navigation = TrackNavigation::new(track(), [None; MAX_SOURCES]);
         let mut hear = |t: f64| {
             let times = Times { received: at(t), valid: at(t) };

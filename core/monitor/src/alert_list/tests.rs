@@ -292,7 +292,7 @@ fn higher_priority_needs_a_new_acknowledgement() {
 }
 
 #[test]
-fn alert_spans_the_part_still_missed() {
+fn alert_spans_only_wall_that_is_still_missed() {
     let mut bench = Bench::new(0.0, 0.0);
     let stretch = |bench: &Bench| bench.list.iter().next().and_then(|alert| alert.stretch);
     bench.run(0, RunChange::Raised, (40, 41), None);

@@ -34,7 +34,7 @@ fn commands_are_read_as_documented() {
 }
 
 #[test]
-fn ports_accept_as_many_notes_as_the_report_holds() {
+fn console_accepts_notes_until_the_report_is_full() {
     let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
     let port = ConsolePort { waiting: Arc::clone(&waiting), clock: None, notes: Arc::default() };
     let other = port.clone();

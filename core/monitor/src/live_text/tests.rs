@@ -51,7 +51,7 @@ fn states() -> Vec<LiveState> {
 }
 
 #[test]
-fn status_line_in_full_and_at_60_columns() {
+fn status_line_cut_to_60_columns_keeps_problem_and_action() {
     let lines = |columns: usize| states().iter().map(|state| status(state).cut(columns)).collect::<Vec<_>>();
     let narrow = lines(60);
     assert!(narrow.iter().all(|line| line.chars().count() <= 60));
@@ -79,7 +79,7 @@ fn stretch(why: Unsure) -> UnsureStretch {
 
 /// A speed over the limit must not read like the limit.
 #[test]
-fn speed_over_the_limit_reads_differently_from_it() {
+fn speed_just_over_the_limit_has_enough_digits_to_differ() {
     assert_eq!(speed_decimals(Some(0.104), Some(0.098)), 3);
     assert_eq!(speed_decimals(Some(0.098), Some(0.104)), 2, "it is within the limit");
     assert_eq!(speed_decimals(Some(0.12), Some(0.098)), 2);

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn each_update_of_a_tick_has_advice_with_the_time_left() {
+    fn every_update_within_a_tick_gets_advice_with_the_time_left() {
         let head = HeadSpec {
             mount: mount(),
             step_rad: 0.0157,
@@ -186,7 +186,7 @@ mod tests {
     /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, heads 0.8 m apart
     /// reach the same place 8 s after one another.
     #[test]
-    fn swing_covers_the_time_between_passes_and_between_heads_along_the_hull() {
+    fn swing_is_measured_between_passes_and_between_heads_along_the_hull() {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();

@@ -290,7 +290,7 @@ mod tests {
     /// The place is half a metre before the missed stretch that begins at 5 m, or before the one at 10 m.
     /// Half a metre is the target.
     #[test]
-    fn vehicle_going_back_turns_before_the_nearest_missed_stretch() {
+    fn turning_point_on_the_way_back_is_before_the_nearest_missed_stretch() {
         let turns_m = |failed: &[i64], speed_mps: f64, x_m: Option<f64>| {
             back_to_m(&missed(failed), &Situation { speed_mps, ..situation(x_m) })
         };
@@ -379,7 +379,7 @@ mod tests {
     /// A ping is no evidence of the speed if two standard deviations against the previous pass reach the
     /// target. The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn ping_with_an_uncertain_place_is_no_evidence_of_the_speed() {
+    fn ping_with_an_uncertain_position_does_not_count_for_the_speed() {
         let profile = pipe();
         let noted = |sd_m: f64| {
             let mut coverage = coverage();
@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn reach_of_a_pinging_head_stays_at_the_last_fix() {
+    fn head_that_pings_without_a_fix_keeps_its_last_position() {
         let at = |seconds: u64| MonoNs(seconds * 1_000_000_000);
         let ping = |seconds: u64, x_m: Option<f64>| PlacedPing {
             received: at(seconds),
@@ -415,7 +415,7 @@ mod tests {
     /// At 0.4 m/s, 2 m are covered in five seconds. The checked wall extends from a quarter of a metre behind
     /// the rear head to a quarter of a metre ahead of the front head's future place.
     #[test]
-    fn all_has_passed_if_the_visible_and_the_upcoming_wall_have() {
+    fn condition_is_passed_only_if_visible_and_upcoming_wall_has_passed() {
         let passed = |between: core::ops::Range<i64>, speed_mps: f64, x_m: Option<f64>| {
             let mut coverage = coverage();
             for index in between {

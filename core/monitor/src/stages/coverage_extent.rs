@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_head_moves_with_the_vehicle_and_marks_sections() {
+    fn silent_head_position_follows_the_vehicle_and_marks_sections_as_silent() {
         // The second head is silent from 1 s on. The first one keeps pinging.
         let mut bench = Bench::new([Some(9), Some(1)]);
         assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first head is at its last ping");

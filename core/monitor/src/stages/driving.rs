@@ -291,7 +291,7 @@ mod tests {
     /// Four heads are a quarter of a turn apart and turn in 8 s. Without one of them, the longest gap is half
     /// a turn.
     #[test]
-    fn stalled_head_counts_again_only_once_in_phase() {
+    fn stalled_head_counts_as_stalled_until_back_in_phase() {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
@@ -324,7 +324,7 @@ mod tests {
     /// From the centre of a pipe of 3 m radius a step measures 0.0471 m along the wall. This leaves 0.4978 m
     /// of the target along the tunnel, to be driven in 2 s plus one ping period.
     #[test]
-    fn fitting_speed_allows_for_the_steps_along_the_wall() {
+    fn speed_that_meets_the_target_allows_for_steps_along_the_wall() {
         let along_m = math::sqrt(0.25 - 9.0 * STEP_RAD * STEP_RAD);
         let most_mps = along_m / 2.02;
         let fits_mps = |planned_mps: f64| {
@@ -347,7 +347,7 @@ mod tests {
     /// The place is 1 m below the centre of a pipe of 3 m radius. Per radian, a step measures 2 m along the
     /// floor, 4 m along the ceiling and 3 m at the sides.
     #[test]
-    fn steps_are_the_largest_of_their_waiting_class() {
+    fn largest_step_is_found_for_each_class_of_time_between_passes() {
         const SMALL_RAD: f64 = 1e-4;
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -379,7 +379,7 @@ mod tests {
 
     /// The farther the vehicle is from the centre, the longer is a step on the opposite wall.
     #[test]
-    fn steps_are_recomputed_after_5_cm_across_or_a_changed_head_step() {
+    fn steps_are_recomputed_after_5_cm_sideways_or_a_new_head_step() {
         let profile = shapes::circle(3.0).unwrap();
         let mut driving = Driving::default();
         let mut t_y_m = |aside_m: f64, finer: f64| {

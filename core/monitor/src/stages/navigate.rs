@@ -108,7 +108,7 @@ mod tests {
 
     /// Updates come five times a second, from the first packet on.
     #[test]
-    fn each_update_comes_once_and_a_gap_gives_only_the_last() {
+    fn each_update_is_due_once_and_a_gap_gives_only_the_latest() {
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
         let mut next = None;
         for (now_s, beat_s) in [

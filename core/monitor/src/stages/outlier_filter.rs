@@ -303,7 +303,7 @@ mod tests {
     /// An isolated echo in front of the wall waits for the next return. Then it counts as missing, for holes
     /// and for causes.
     #[test]
-    fn isolated_echo_is_a_missing_sample_at_its_aim() {
+    fn isolated_echo_counts_as_a_missing_sample_at_its_aim() {
         for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {
             let mut bench = Bench::new();
             assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
@@ -321,7 +321,7 @@ mod tests {
 
     /// A rock of 0.6 m in height is wide enough to be wall from its first return on.
     #[test]
-    fn waiting_return_is_wall_once_the_next_returns_agree() {
+    fn undecided_return_is_wall_once_the_next_returns_agree() {
         let mut bench = Bench::new();
         bench.note(&at(0, 3.0));
         let mut found = Vec::new();
@@ -356,7 +356,7 @@ mod tests {
     /// The first two returns are from a rock. Pings that come while the first one waits take effect when it
     /// is classified.
     #[test]
-    fn loss_after_a_waiting_return_breaks_the_sweep() {
+    fn lost_ping_after_an_undecided_return_breaks_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {
             let mut bench = Bench::new();
             bench.note(&at(0, 3.0));
@@ -446,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn waiting_return_at_the_end_of_a_dive_is_doubtful() {
+    fn undecided_return_at_the_end_of_a_dive_is_doubtful() {
         let mut bench = Bench::new();
         bench.note(&at(0, 3.0));
         bench.note(&at(1, 1.5));

@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_form_single_steps_until_one_is_lost() {
+    fn consecutive_samples_form_single_steps_until_a_ping_is_lost() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
         let mut note = |ping: &PlacedPing| {
             assert_eq!(note_sample(&mut coverage, &mut sweep, &tunnel, ping), Ok(()));

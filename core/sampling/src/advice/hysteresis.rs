@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn small_changes_do_not_appear() {
+    fn small_changes_of_the_advised_speed_are_not_displayed() {
         let wavering = (0..300).map(|k| speed(0.1 + if k % 7 < 3 { 0.0009 } else { 0.0027 }));
         let speeds: Vec<f64> = shown(wavering).iter().map(|advice| advice.v_max_mps).collect();
         assert!(speeds[1..].iter().all(|speed_mps| (speed_mps - 0.1009).abs() < 1e-12));
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn exceedance_appears_at_once_and_clears_at_the_target() {
+    fn exceedance_is_displayed_at_once_and_cleared_below_the_target() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
             // T exceeds the target by less than `BEYOND`.
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn possible_exceedance_has_hysteresis() {
+    fn possible_exceedance_is_displayed_with_hysteresis() {
         let at =
             |t_m: f64| Advice { may_exceed: t_m > 0.4, sure_m: 0.4, ..advice(Reason::HelixPitch, 0.2, t_m) };
         let given = [vec![at(0.411); 3], vec![at(0.413)], vec![at(0.406); 10], vec![at(0.403); 8]].concat();

@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn search_finds_the_highest_interval() {
+    fn search_finds_the_upper_end_of_the_highest_speed_interval() {
         let islands = |mps: f64| (0.05..=0.1).contains(&mps) || (0.13..=0.15).contains(&mps);
         assert!((highest_mps(0.3, |mps| mps < 0.1) - 0.1).abs() < 1e-9);
         assert!((highest_mps(0.3, |_| true) - 0.3).abs() <= 0.0 && highest_mps(0.3, |_| false) <= 0.0);

@@ -250,7 +250,7 @@ fn mutual_occlusion_lowers_the_speed() {
 }
 
 #[test]
-fn outdated_rings_are_recast_one_per_call() {
+fn outdated_rings_of_rays_are_recast_one_per_call() {
     let mut case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
     for (spec, y_m) in case.specs.iter_mut().zip([-0.5, 0.0, 0.5]) {
         spec.mount.position = Vec3::new(0.0, y_m, 0.0);
@@ -270,7 +270,7 @@ fn outdated_rings_are_recast_one_per_call() {
 }
 
 #[test]
-fn moving_vehicle_has_no_ring_older_than_3_updates() {
+fn moving_vehicle_has_no_ring_of_rays_older_than_3_updates() {
     let case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
     let mut advisor = case.advisor();
     let pose = case.situation.pose.unwrap();
@@ -323,7 +323,7 @@ fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
 }
 
 #[test]
-fn cached_rings_hardly_change_the_advice() {
+fn cached_rings_of_rays_change_the_advice_by_at_most_2_percent() {
     let around = || Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
     let (still, swing) =
         (Swing::default(), Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 });
@@ -609,7 +609,7 @@ fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
 }
 
 #[test]
-fn lost_share_is_the_mean_over_all_shares() {
+fn mean_lost_share_is_the_mean_over_all_heads() {
     assert!((mean([0.1, 0.2, 0.6].into_iter()) - 0.3).abs() < 1e-12);
     assert!(mean(core::iter::empty()).abs() <= 0.0);
 }

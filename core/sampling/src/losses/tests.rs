@@ -155,7 +155,7 @@ fn no_extra_passes_without_losses_or_without_a_speed() {
 ///
 /// Without chance losses, no hole counts as caused by chance.
 #[test]
-fn hole_is_by_chance_if_enough_losses_can_coincide() {
+fn hole_is_attributed_to_chance_if_enough_losses_can_coincide() {
     let hole = |hole_m: f64, rate: LossRate| sampled(0.1).is_by_chance(hole_m, 0.3, rate);
     let often = LossRate { share: 0.3, after_lost: 0.6 };
     assert!(hole(0.55, often), "the loss of one pass and three pings is likely");

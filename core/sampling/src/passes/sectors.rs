@@ -76,7 +76,7 @@ mod tests {
     ///
     /// The unevenness is tested at the planned speed and 10 % above it.
     #[test]
-    fn sector_heads_are_even_only_at_the_planned_speed() {
+    fn sector_heads_pass_at_equal_distances_only_at_the_planned_speed() {
         const SWEEP_S: f64 = 4.0;
         let mount = |x_m: f64, y_m: f64| Mount {
             position: Vec3::new(x_m, y_m, 0.0),

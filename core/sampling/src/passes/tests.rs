@@ -59,7 +59,7 @@ fn place_hidden_from_some_heads_has_longer_gaps() {
 }
 
 #[test]
-fn time_for_several_passes_fills_up_whole_turns() {
+fn time_for_several_passes_is_the_longest_over_all_starts() {
     let even = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let time_s = |heads: HeadSet, needed: f64| even.time_for_s(heads, even.gap_s(heads).unwrap(), needed);
     let all = even.heads();
@@ -119,7 +119,7 @@ fn late_head_has_a_positive_phase_error() {
 }
 
 #[test]
-fn reversed_heads_are_phased_alike_and_opposed_heads_are_not() {
+fn heads_must_all_rotate_in_the_same_sense_to_be_in_phase() {
     let mut mirrored = situation(&[0.0, 180.0], &[0.0, 0.0]);
     for head in mirrored.heads.iter_mut().flatten() {
         head.rate_radps = -head.rate_radps;
@@ -133,7 +133,7 @@ fn reversed_heads_are_phased_alike_and_opposed_heads_are_not() {
 }
 
 #[test]
-fn heads_out_of_step_have_the_gap_of_the_fastest_one() {
+fn heads_with_unequal_turn_times_have_the_gap_of_the_fastest() {
     let mut mixed = situation(&[0.0, 180.0], &[0.0, 0.0]);
     if let Some(second) = mixed.heads.iter_mut().flatten().nth(1) {
         second.rate_radps = TAU / 21.6;
@@ -179,7 +179,7 @@ fn parallax_is_larger_in_a_narrow_tunnel() {
 
 /// The result does not depend on the position of the vehicle's origin along the hull.
 #[test]
-fn mean_distance_of_successive_heads_is_a_share_of_their_spread() {
+fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
     for origin_m in [-3.0, 0.0, 0.4, 5.0] {
         let at = |x_m: &[f64]| {
             let x_m: Vec<f64> = x_m.iter().map(|x_m| x_m + origin_m).collect();

@@ -140,7 +140,7 @@ fn sector_heads_look_outwards_and_leave_floor_and_crown_unseen() {
 }
 
 #[test]
-fn target_gives_speed_and_time_gives_target() {
+fn plan_gives_the_speed_for_a_target_or_the_target_for_a_time() {
     let planner = Planner::new(ideal(2)).unwrap();
     let answers = planner.answers(&speed(1.0), None).unwrap();
     let best: Vec<_> = answers.iter().filter(|answer| answer.best).map(|answer| answer.mode).collect();
@@ -306,7 +306,7 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
 ///
 /// The live advice therefore differs from a plan, which may restart the heads.
 #[test]
-fn heads_started_for_another_speed_lower_the_speed() {
+fn heads_started_for_another_speed_lower_the_largest_speed() {
     let target_m = 0.6;
     let mode = 2;
     let apart = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
@@ -339,7 +339,7 @@ fn error_names_the_configured_target() {
 ///
 /// For heads at different positions, minimum and maximum are over all heads.
 #[test]
-fn smallest_and_largest_neighbour_distances_are_over_all_heads() {
+fn minimum_and_maximum_neighbour_distances_are_over_all_heads() {
     let chords_m = |inspection: Inspection| {
         let planner = Planner::new(inspection).unwrap();
         planner.modes().iter().map(|mode| mode.chords_m).collect::<Vec<_>>()

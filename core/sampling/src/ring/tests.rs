@@ -116,7 +116,7 @@ fn yaw_lengthens_steps_and_beam_along_the_tunnel_is_an_error() {
 }
 
 #[test]
-fn strided_ring_has_the_largest_step_of_a_coarser_head_over_all_start_angles() {
+fn largest_step_over_every_eighth_ray_equals_that_of_a_coarser_head() {
     let profile = shapes::ceran().unwrap();
     let fine = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let coarse = |start: u32| {

@@ -275,7 +275,7 @@ fn overlapping_hidden_arcs_across_the_seam_form_one_strip() {
 }
 
 #[test]
-fn full_capacity_hides_more_wall_and_never_less() {
+fn obstacle_list_at_capacity_overestimates_hidden_wall() {
     // Slots all around the profile are outside the range limits. One of the two views has too little capacity for the
     // slots.
     let points: Vec<[f64; 2]> = (0..240)
@@ -305,7 +305,7 @@ fn full_capacity_hides_more_wall_and_never_less() {
 
 /// In either direction of rotation, the strip changes at this distance, even across the seam.
 #[test]
-fn each_sounding_has_the_distance_to_its_strip_end() {
+fn distance_to_the_end_of_the_strip_is_right_for_each_sounding() {
     let mut strips = strips(&[all_around(&[arc(4.0, 3.0), arc(28.0, 3.5)]), all_around(&[arc(10.0, 5.0)])]);
     let ring = ring(&pipe());
     for (forward, side) in [(true, 1.0), (false, -1.0)] {

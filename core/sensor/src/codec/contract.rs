@@ -246,7 +246,7 @@ macro_rules! codec_contract {
             /// A truncated frame may match together with the next bytes. Then only the frame with those bytes is
             /// lost.
             #[test]
-            fn truncated_frame_that_matches_with_the_next_hides_only_that_one() {
+            fn truncated_frame_completed_by_the_next_frame_hides_only_that_frame() {
                 for frame in $frames {
                     let frame: &[u8] = frame.as_ref();
                     for cut in matching_into_the_next(&|| $codec, frame) {

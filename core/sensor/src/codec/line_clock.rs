@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn more_packets_than_tracked_are_merged() {
+    fn packets_beyond_the_tracked_number_share_a_receive_time() {
         let mut clock = clock(5);
         let mut packets: Vec<&[u8]> = vec![&[]; 100];
         packets[0] = &[0xA5, 5];

@@ -23,7 +23,7 @@ fn truncated<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Vec<f64> {
 }
 
 #[test]
-fn digits_come_from_rounding_or_truncation() {
+fn printed_digits_are_recognised_as_rounded_or_truncated() {
     let digits = |text: &str, ours| Printed::parse(text).unwrap().digits_of(ours);
     assert_eq!(digits("1.55", 1.4 / 0.9), Digits::Truncated);
     assert_eq!(digits("2.67", 2.4 / 0.9), Digits::Rounded);
@@ -66,7 +66,7 @@ fn table_2_matches_to_the_digit() {
 }
 
 #[test]
-fn baseline_t_x_match_except_fast() {
+fn t_x_matches_the_paper_at_fitting_speed_except_in_mode_fast() {
     let tables = tables();
     let one = tables.table_3.rows.iter().map(|row| (row.mode.to_owned(), &row.t_x_m));
     assert_eq!(apart(one), ["FAST"]);
@@ -85,7 +85,7 @@ fn baseline_t_x_match_except_fast() {
 }
 
 #[test]
-fn means_give_a_consistent_perimeter() {
+fn printed_mean_steps_are_consistent_with_one_perimeter() {
     let tables = tables();
     let one = tables.table_3.rows.iter().map(|row| (row.mode.to_owned(), &row.t_y_mean_m));
     assert_eq!(apart(one), ["SLOW", "FAST", "FASTER", "FASTEST"]);

@@ -23,7 +23,7 @@ fn close(value: f64, wanted: f64, share: f64) {
 }
 
 #[test]
-fn polygon_of_a_circle_is_short_by_its_chords() {
+fn polygon_through_points_of_a_circle_has_the_length_of_its_chords() {
     let profile = shapes::circle(4.0).unwrap();
     let pings = turn(&profile, [0.0, 4.0], 0.0, 1);
     let chords = 1200.0 * 8.0 * math::sin(PI / 1200.0);
@@ -46,7 +46,7 @@ fn corrected_skeleton_of_a_circle_has_its_perimeter() {
 }
 
 #[test]
-fn thin_beam_gives_the_perimeter_of_ceran() {
+fn thin_beam_measures_the_perimeter_of_the_ceran_tunnel() {
     let profile = shapes::ceran_blueprint().unwrap();
     let pings = turn(&profile, profile.reference(), 0.0, 1);
     close(polygon_m(&least_ranges(&pings)).unwrap(), 34.17, 1e-3);

@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn functions_sum_to_one() {
+    fn basis_functions_sum_to_one() {
         let ones = vec![1.0; FINE.len()];
         for place in [[1.0, -2.0, 0.5], [5.0, 0.5, 3.5], [2.2, -1.1, 1.7]] {
             assert!((FINE.value(&ones, place) - 1.0).abs() < 1e-15);

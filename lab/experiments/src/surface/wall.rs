@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn tube_at_a_known_offset_has_that_distance() {
+    fn tube_5_cm_off_the_wall_has_that_mean_distance() {
         let profile = shapes::circle(2.0).unwrap();
         let stretch = Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.1 };
         let mesh = tube(&profile, 0.05);

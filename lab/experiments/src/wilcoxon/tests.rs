@@ -67,7 +67,7 @@ fn all_choices(ranks: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn exact_p_matches_all_sign_choices() {
+fn exact_p_value_equals_a_count_over_all_sign_choices() {
     for n in 1..=12 {
         let ranks: Vec<f64> = (1..=n).map(f64::from).collect();
         let choices = all_choices(&ranks);

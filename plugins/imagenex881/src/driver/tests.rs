@@ -243,7 +243,7 @@ fn heads_keep_their_phases_independently() {
 }
 
 #[test]
-fn fault_leaves_no_gap_and_the_phase_recovers() {
+fn line_fault_loses_only_its_own_pings_and_the_phase_recovers() {
     let faults = [
         Faults { lost_commands: vec![300], ..Faults::default() },
         Faults { lost_answers: vec![300, 310], ..Faults::default() },

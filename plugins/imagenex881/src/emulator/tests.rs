@@ -89,7 +89,7 @@ fn wall_beyond_the_range_setting_gives_no_echo() {
 }
 
 #[test]
-fn turn_closes_and_continues_in_either_direction() {
+fn turn_ends_at_its_start_angle_and_continues_in_either_direction() {
     for (mode, step) in [("slow", 1), ("medium", 2), ("fast", 3), ("faster", 4), ("fastest", 8)] {
         for growing in [true, false] {
             let pings = 1200 / step as usize;
@@ -106,7 +106,7 @@ fn turn_closes_and_continues_in_either_direction() {
 }
 
 #[test]
-fn sign_and_offset_keep_the_program_in_the_sensor_frame() {
+fn inverted_sign_and_offset_do_not_change_the_program_in_the_sensor_frame() {
     let text = "mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 33";
     let run = run(text, DurNs::ZERO, turning(PI / 2.0, true), 50);
     for (k, got) in (0..).zip(counts(&run)) {
@@ -196,7 +196,7 @@ fn answer_has_the_position_of_the_head() {
 }
 
 #[test]
-fn imported_soundings_are_answered_without_a_begin() {
+fn emulator_answers_imported_soundings_without_being_started() {
     let settings = settings("mode = \"fastest\"\nrange_m = 5").unwrap();
     let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
     let mut emulator = HeadEmulator::new(settings.clone(), DurNs(0), &setup);

@@ -52,7 +52,7 @@ fn reading_is_valid_one_latency_before_its_return() {
 }
 
 #[test]
-fn near_ranges_have_2_mm_resolution_and_no_echo_gives_no_range() {
+fn near_range_has_2_mm_resolution_and_missing_echo_gives_no_range() {
     let mut decoder = decoder("mode = \"fast\"\nrange_m = 3");
     let near = Return { header: Header { range_m: 3, profile_counts: 1234, ..good().header }, ..good() };
     let [(_, sonar)] = decode(&mut decoder, 0, &bytes(&near))[..] else { panic!() };
@@ -133,7 +133,7 @@ fn head_specification_follows_its_settings() {
 }
 
 #[test]
-fn returns_without_echo_give_the_same_readings() {
+fn removing_echo_data_from_returns_does_not_change_readings() {
     let echo = Bytes::new(&[0x5A; 252]).unwrap();
     let long = Return { header: Header { tag: Tag::Imx, ..good().header }, echo };
     let packet = [bytes(&long), bytes(&good()), bytes(&long)].concat();

@@ -149,7 +149,7 @@ fn unavailable_values_are_none() {
 }
 
 #[test]
-fn base_moves_the_codes_to_29_bits() {
+fn configured_base_shifts_xsens_message_ids_to_29_bits() {
     let based = MessageSet::Xsens(xsens::Ids { base: Some(0x19FF_0000) });
     let text = "19FF0032#000000000200";
     assert_eq!(message(based, text), Message::Xsens(xsens::Message::RateOfTurn([0, 0, 512])));

@@ -146,7 +146,7 @@ fn nack_keeps_its_readable_text() {
 }
 
 #[test]
-fn unknown_message_is_kept_and_known_ids_are_refused_as_unknown() {
+fn unknown_message_is_kept_and_cannot_be_sent_under_a_known_id() {
     let other = |id| Addressed {
         source: 1,
         destination: 0,

@@ -109,7 +109,7 @@ impl Rig {
 }
 
 #[test]
-fn settings_precede_a_distance_each_interval() {
+fn driver_sends_settings_once_and_requests_a_distance_each_interval() {
     let mut rig = Rig::new("interval_ms = 50\nsound_speed_mps = 1447\nscan_m = 8\ngain = 2", 0);
     rig.run(10.0);
     assert!((190..=200).contains(&rig.distances()), "{}", rig.distances());

@@ -94,7 +94,7 @@ fn echosounder_specification_follows_its_settings() {
 }
 
 #[test]
-fn profile_without_strengths_gives_the_same_reading() {
+fn removing_echo_strengths_from_a_profile_does_not_change_its_reading() {
     let strengths = Bytes::new(&[1; 150]).unwrap();
     let profile = frame(&Message::Profile(Profile { distance: PING, strengths }));
     let mut shorter = Vec::new();

@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn sources_are_numbered_by_metadata_that_number_all() {
+    fn source_numbers_come_from_metadata_only_if_all_are_valid() {
         let stated =
             [("/raw/a", Some("1")), ("/raw/b", Some("0")), ("/sent/a", Some("1")), ("/loop/tick", None)];
         assert_eq!(ids(&channels(&stated)), ["b", "a"]);

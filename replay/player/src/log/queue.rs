@@ -308,7 +308,7 @@ mod tests {
 
     /// Entries arrive whole and in order, and none remains in the queue, in every interleaving of loop and recorder.
     #[test]
-    fn recorder_takes_all_entries_whole_before_it_stops() {
+    fn recorder_takes_every_entry_completely_before_it_stops() {
         let name = "header then body in the recorder's queue, and its stop";
         let executions = explored(name, |consumer| consumer, as_it_is);
         assert!(executions > 50, "{executions}");
@@ -316,13 +316,13 @@ mod tests {
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn exploration_finds_a_recorder_that_takes_incomplete_entries() {
+    fn model_detects_a_recorder_that_takes_incomplete_entries() {
         explored("the recorder's queue, a message not waited for", Hasty, as_it_is);
     }
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn exploration_finds_a_recorder_that_reads_the_flag_last() {
+    fn model_detects_a_recorder_that_reads_the_stop_flag_last() {
         explored(
             "the recorder's stop, the flag read last",
             |consumer| consumer,

@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn snapshot_too_large_beside_the_first_is_not_kept() {
+    fn snapshot_that_does_not_fit_beside_the_first_is_dropped() {
         let mut store = SnapshotStore::new(1 << 20, INTERVAL);
         store.insert(MonoNs(5), &noise(2 << 20, 1));
         store.insert(MonoNs(6), &noise(2 << 20, 2));

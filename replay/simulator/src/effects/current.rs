@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn current_changes_the_duration_of_a_pilot_but_not_the_end() {
+    fn current_changes_the_duration_of_a_piloted_drive_but_not_its_end() {
         let end = |keys: &str| {
             let sim = Bench::on(PILOT, keys).simulation();
             (sim.duration_s(), sim.pose(sim.end()).unwrap().position.x())

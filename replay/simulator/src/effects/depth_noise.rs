@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_white_with_the_given_strength() {
+    fn depth_noise_is_white_with_the_given_strength() {
         let errors = errors_pa("[effects.depth_noise]\nnoise_pa = 300\n");
         let n = errors.len() as f64;
         assert!(n > 3000.0);
@@ -127,7 +127,7 @@ mod tests {
 
     /// Over a lag t, a Gauss-Markov process changes by a mean square of 2 sd^2 (1 - exp(-t / tau)).
     #[test]
-    fn drift_changes_at_the_given_rate() {
+    fn depth_drift_changes_at_the_given_rate() {
         let parameters = Parameters { noise_pa: 0.0, offset_sd_pa: 0.0, drift_pa: 100.0, tau_s: 20.0 };
         let stream = Stream::new(3, "depth_noise", "depth");
         let mut noise = DepthNoise { parameters, stream, offset_pa: 0.0, drift: 0.0, before: None };
@@ -144,7 +144,7 @@ mod tests {
 
     /// The drift's increments are independent of the noise in these samples.
     #[test]
-    fn noise_and_drift_are_independent() {
+    fn depth_noise_and_drift_are_independent() {
         let stream = Stream::new(3, "depth_noise", "depth");
         let series = |noise_pa: f64, drift_pa: f64| -> Vec<f64> {
             let parameters = Parameters { noise_pa, offset_sd_pa: 0.0, drift_pa, tau_s: 1.0 };
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn offsets_of_many_dives_have_the_given_spread() {
+    fn depth_offsets_of_many_dives_have_the_given_spread() {
         let offset_pa = |seed: u64| {
             let keys = "[effects.depth_noise]\noffset_sd_pa = 1000\n";
             let [plain, with] =
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn offset_is_constant_over_the_dive_and_slices() {
+    fn depth_offset_is_constant_over_the_dive_and_simulation_slices() {
         let errors = errors_pa("[effects.depth_noise]\noffset_sd_pa = 1000\n");
         assert!(errors[0] != 0.0 && errors.iter().all(|error| (error - errors[0]).abs() < 1e-6));
         same_in_any_slices(&Bench::turning("[effects.depth_noise]\nnoise_pa = 300\ndrift_pa = 100\n"));

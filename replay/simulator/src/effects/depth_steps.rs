@@ -72,7 +72,7 @@ mod tests {
     use crate::testing_motion::{Bench, LEGS, refusal};
 
     #[test]
-    fn depths_are_whole_steps_within_half_a_step() {
+    fn reported_depths_are_multiples_of_the_step_within_half_a_step() {
         let wander = "[effects.pilot_drift]\nup_m = 0.5\n";
         let keys = format!("{wander}[effects.depth_steps]\n");
         let (plain, stepped) =

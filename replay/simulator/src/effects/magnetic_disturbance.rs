@@ -170,7 +170,7 @@ mod tests {
     use crate::testing_motion::{Bench, LONG, refusal};
 
     #[test]
-    fn disturbance_turns_only_yaw_most_at_its_middle_and_within_its_ends() {
+    fn magnetic_disturbance_adds_a_bell_shaped_error_to_yaw_only() {
         let keys = "[effects.magnetic_disturbance]\n\
                     places = [{ chainage_m = 20, length_m = 4, deg = 10 }, { chainage_m = 21, length_m = 4, deg = -4 }]\n";
         let (plain, pulled) = (Bench::on(LONG, ""), Bench::on(LONG, keys));
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn random_places_have_the_given_rate_and_strength() {
+    fn random_disturbances_have_the_given_rate_and_strength() {
         let disturbance = Disturbance {
             per_100m: 5.0,
             up_to_rad: 0.2,

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_have_the_given_mean_length_and_share() {
+    fn runs_of_lost_returns_have_the_given_mean_length_and_share() {
         let (share, mean) = (0.2, 8.0);
         let dive = Dive { seconds: 2000.0, ..Dive::with_head() };
         let lost = lost(&dive, "share = 0.2\nmean_run = 8");

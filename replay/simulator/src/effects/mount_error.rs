@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_have_the_given_spread_and_are_independent_per_sensor() {
+    fn mount_errors_have_the_given_spread_and_are_independent_per_sensor() {
         let mut places = Vec::new();
         for seed in 0..200 {
             let dive = Dive { seed, seconds: 0.2, ..Dive::with_heads(&[[0.3, 0.0, 0.0], [-0.3, 0.0, 0.0]]) };
@@ -141,7 +141,7 @@ mod tests {
     /// Roll turns a beam that is perpendicular to the head's axis within its plane. Pitch and yaw turn it out of the
     /// plane.
     #[test]
-    fn angles_have_the_given_spread_about_each_axis() {
+    fn mount_angle_errors_have_the_given_spread_about_each_axis() {
         let sd_rad = f64::to_radians(0.5);
         let (mut within, mut out) = (Vec::new(), Vec::new());
         for seed in 0..400 {

@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn share_grows_with_incidence() {
+    fn share_of_multipath_returns_grows_with_incidence_angle() {
         let dive = Dive {
             seconds: 500.0,
             tunnel: "profile = \"rectangle\"\nwidth_m = 4\nheight_m = 3",

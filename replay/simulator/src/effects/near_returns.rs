@@ -177,7 +177,7 @@ mod tests {
     /// The wall is 3 m away, so half of the clusters from 2 to 4 m are in front of the wall. A ping that the sonar
     /// loses has no return, even if it hit a cluster.
     #[test]
-    fn clusters_beyond_the_wall_are_not_heard_and_lost_pings_stay_lost() {
+    fn clusters_beyond_the_wall_give_no_return_and_lost_pings_stay_lost() {
         let dive = Dive { seconds: 400.0, ..Dive::with_sounder() };
         let keys = "[effects.near_returns]\nshare = 0.4\nnear_m = 2\nfar_m = 4\nspread_m = 0\n";
         let (base, with) = (dive.dive("").ranges_m(0), dive.dive(keys).ranges_m(0));
@@ -197,7 +197,7 @@ mod tests {
     /// There are two stretches with a gap between them. Nearly every ping hits a cluster, and the first stretch's
     /// cluster must end with the stretch.
     #[test]
-    fn cluster_ends_with_its_stretch() {
+    fn near_return_cluster_ends_with_its_configured_stretch() {
         let dive = Dive { seconds: 60.0, ..Dive::with_head() };
         let table = |from_m: f64, near_m: f64| {
             format!(

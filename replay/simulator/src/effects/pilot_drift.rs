@@ -72,7 +72,7 @@ mod tests {
     use crate::testing_motion::{Bench, LONG};
 
     #[test]
-    fn drift_reaches_its_limits_without_exceeding_them() {
+    fn pilot_drift_reaches_its_limits_without_exceeding_them() {
         let keys = "[effects.pilot_drift]\nacross_m = 1.5\nup_m = 0.5\nyaw_deg = 15\nperiod_s = 2\n";
         let (plain, sim) = (Bench::on(LONG, "").simulation(), Bench::on(LONG, keys).simulation());
         let reach = [0.0, 1.5, 0.5, 0.0, 0.0, f64::to_radians(15.0)];

@@ -113,7 +113,7 @@ mod tests {
 
     /// For a command c(t) = w t that grows from rest, the response is y = w (t - T + T exp(-t / T)).
     #[test]
-    fn lag_matches_its_closed_form() {
+    fn lag_at_sector_ends_matches_its_closed_form() {
         let (plain, slowed) = (pings(""), pings(KEYS));
         let first_rad = turned(&plain[0], &plain[1]);
         let rate_radps = first_rad / between_s(&plain[0], &plain[1]);

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn share_is_as_given_and_perpendicular_beams_have_no_lobe_echo() {
+    fn side_lobe_share_is_as_configured_and_perpendicular_beams_have_none() {
         let dive = Dive { seconds: 500.0, ..Dive::with_head() };
         let (mut oblique, mut taken) = (0, 0);
         for row in &dive.dive("[effects.side_lobes]\nshare = 0.2").rows {

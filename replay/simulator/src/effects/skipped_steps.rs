@@ -84,7 +84,7 @@ mod tests {
     use crate::testing_motion::{Bench, refusal, same_in_any_slices};
 
     #[test]
-    fn skipped_steps_have_the_given_rate_and_are_never_made_up() {
+    fn skipped_steps_have_the_given_rate_and_are_not_caught_up_later() {
         let plain: Vec<Sounding> = Bench::long("").run("head_a");
         let step_rad = plain[1].angle_rad - plain[0].angle_rad;
         for told in [false, true] {

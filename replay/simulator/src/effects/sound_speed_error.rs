@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_and_double_speeds_are_refused() {
+    fn missing_or_conflicting_speeds_of_sound_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.sound_speed_error]\n{keys}"));
         assert!(refusal("").contains("is needed, and not both"));
         assert!(refusal("true_mps = 1450\nshare = 0.01").contains("not both"));

@@ -141,7 +141,7 @@ mod tests {
     /// Compares the slack with sines fitted by least squares. Each swing has its reach and period, and no other slack
     /// remains.
     #[test]
-    fn swings_are_sines_of_full_reach_without_further_slack() {
+    fn each_slack_swing_is_a_sine_with_its_full_amplitude_and_period() {
         let keys = "[effects.tether_slack]\nswings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.055, period_s = 20 }]\n";
         let (plain, slack) = (Bench::on(LONG, "").run("tether"), Bench::on(LONG, keys).run("tether"));
         let more = plain

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_have_the_given_spread() {
+    fn rough_wall_heights_have_the_given_spread() {
         let many = || (0..100_000).map(|k| at_m(f64::from(k) * 0.137, f64::from(k % 97) * 0.211));
         assert!(mean(many()).abs() < 0.0005, "{}", mean(many()));
         let sd_m = mean(many().map(|h_m| h_m * h_m)).sqrt();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_are_correlated_only_within_the_length() {
+    fn rough_wall_heights_are_correlated_only_within_the_given_length() {
         let alike = |apart_m: f64| {
             mean((0..50_000).map(|k| {
                 let x_m = f64::from(k) * 0.371;

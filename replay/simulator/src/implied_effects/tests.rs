@@ -96,7 +96,7 @@ fn each_description_implies_its_effects() {
 }
 
 #[test]
-fn named_effects_override_implied_ones_and_leave_omits_them() {
+fn named_effects_override_implied_ones_and_the_leave_key_omits_effects() {
     let text = format!(
         "{MURK}[effects]\ntake = \"called\"\nleave = [\"beam_cone\"]\nrange_noise = {{ sd_m = 0.2 }}\n"
     );
@@ -122,7 +122,7 @@ fn omitted_effect_acts_like_an_unnamed_one() {
 }
 
 #[test]
-fn later_call_overrides_keys_of_overlapping_calls() {
+fn later_implied_effect_overrides_keys_of_an_overlapping_earlier_one() {
     let on = |call: Call| call.on(&["a".to_owned(), "b".to_owned()]);
     let calls = [
         on(Call::new("echo_strength", "one", &[("wall_db", number(0.0)), ("silt_gpl", number(1.0))])),

@@ -256,7 +256,7 @@ fn everywhere(speed_mps: f64) -> Flow {
 /// If the flow changes within a leg, the time for each piece is its length divided by its own speed. The positions
 /// within a piece follow from these times.
 #[test]
-fn current_carries_only_within_its_stretch() {
+fn current_changes_the_speed_only_within_its_stretch() {
     let mut flow = Flow::default();
     assert!(flow.add(Stretch { from_m: 4.0, to_m: 7.0 }, 0.1));
     assert!(flow.add(Stretch { from_m: 10.0, to_m: f64::INFINITY }, -0.05));
@@ -294,7 +294,7 @@ fn current_carries_only_within_its_stretch() {
 }
 
 #[test]
-fn current_carries_only_motion_through_water() {
+fn current_changes_legs_and_pilot_and_is_refused_for_ground_trajectories() {
     let mut legs = trajectory("[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.2\n");
     legs.carry(&everywhere(0.1)).unwrap();
     assert!((legs.duration_s() - 40.0).abs() < 1e-9 && (legs.place(20.0).chainage_m - 6.0).abs() < 1e-9);

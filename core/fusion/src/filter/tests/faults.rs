@@ -241,7 +241,7 @@ fn jumping_sensor_is_rejected() {
 }
 
 #[test]
-fn restarted_counter_keeps_the_chainage_only_if_it_alone_was_away() {
+fn restarted_counter_keeps_the_chainage_only_if_no_other_sensor_was_away() {
     for (away_s, are_all_away, is_lost) in [(0.0, false, true), (1.0, true, true), (1.0, false, false)] {
         let rig = Rig::new(cruise, 1);
         let mut events = rig.events(0.0, 60.0);
@@ -315,7 +315,7 @@ fn filter_recovers_from_a_frozen_sensor() {
 ///
 /// In each turn, this range agrees with the wall for a while.
 #[test]
-fn head_with_constant_range_does_not_turn_the_estimate() {
+fn head_with_constant_range_does_not_rotate_the_estimated_attitude() {
     let (for_s, mut gated) = (40.0, 0);
     for seed in 1..=5 {
         let rig = Rig::new(cruise, seed);

@@ -346,7 +346,7 @@ fn cruise_at<const KM: u32>(t: f64) -> Pose {
 ///
 /// The chainage itself becomes less certain with distance because of the cable's scale, by 2 km at 1,000 km.
 #[test]
-fn passes_are_equally_certain_at_any_chainage() {
+fn error_between_passes_is_equally_certain_at_any_chainage() {
     let ways: [(f64, Way); 3] = [(3e3, cruise_at::<3>), (7e3, cruise_at::<7>), (1e6, cruise_at::<1000>)];
     let (mut moved_m, mut sd_off, mut condition) = (0.0_f64, 0.0_f64, 0.0_f64);
     for seed in 1..4 {
@@ -434,13 +434,13 @@ fn change_over_hours(hours: u32) -> f64 {
 }
 
 #[test]
-fn pass_sd_does_not_grow_over_an_hour() {
+fn sd_between_passes_does_not_grow_over_an_hour() {
     found("filter.hour", change_over_hours(1), 0.01);
 }
 
 #[test]
 #[ignore = "takes a minute"]
-fn pass_sd_does_not_grow_over_10_h() {
+fn sd_between_passes_does_not_grow_over_10_h() {
     let change = change_over_hours(10);
     assert!(change < 0.01, "{change}");
 }

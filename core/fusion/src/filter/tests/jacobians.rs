@@ -124,7 +124,7 @@ fn check_row(
 ///
 /// A beam is skipped if its differences cross a corner, because the wall is no plane there.
 #[test]
-fn beam_row_on_flat_walls_equals_differences() {
+fn beam_row_on_flat_walls_equals_finite_differences() {
     let profile = shapes::rectangle(7.0, 8.0).unwrap();
     let mut draws = Draws::new(1);
     // An echosounder's beam, a head's cone, and a cone so wide that the nearest part of the wall echoes.
@@ -178,7 +178,7 @@ fn cone_range_equals_that_of_its_shortest_ray() {
 /// per metre, or by `range` / cosine per radian. The tangent plane then turns by 1 / radius per metre. The row
 /// neglects the effect of this turn on the range, which is range x sin(first) / cos^2 per radian.
 #[test]
-fn beam_row_on_round_walls_equals_differences() {
+fn beam_row_on_round_walls_equals_finite_differences() {
     const RADIUS_M: f64 = 4.0;
     let profile = shapes::circle(RADIUS_M).unwrap();
     let mut draws = Draws::new(2);
@@ -214,7 +214,7 @@ fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: i
 }
 
 #[test]
-fn height_and_chainage_rows_equal_differences() {
+fn height_and_chainage_rows_equal_finite_differences() {
     let mut draws = Draws::new(3);
     for _ in 0..STATES {
         let (state, offset) = (draws.state(), draws.vector(0.8));
@@ -233,7 +233,7 @@ fn height_and_chainage_rows_equal_differences() {
 /// If they differ by an angle, the rows are wrong by half of it. So the measured attitude, deviation included, is
 /// within 1e-7 of the estimate.
 #[test]
-fn attitude_rows_equal_differences() {
+fn attitude_rows_equal_finite_differences() {
     let mut draws = Draws::new(4);
     for _ in 0..STATES {
         let state = State { heading_offset_rad: 0.0, ..draws.state() };
@@ -262,7 +262,7 @@ fn attitude_with_known_compass_deviation_has_no_residual() {
 
 /// The turn rate is an input, so that the gyro bias is not an error of the row.
 #[test]
-fn velocity_and_rest_rows_equal_differences() {
+fn velocity_and_rest_rows_equal_finite_differences() {
     let mut draws = Draws::new(6);
     for _ in 0..STATES {
         let state = draws.state();
@@ -279,7 +279,7 @@ fn velocity_and_rest_rows_equal_differences() {
 
 /// The reference is central differences of the position of a point on a turning body.
 #[test]
-fn velocity_on_a_lever_arm_equals_differences_of_position() {
+fn velocity_on_a_lever_arm_equals_finite_differences_of_position() {
     let mut draws = Draws::new(7);
     for _ in 0..STATES {
         let state = draws.state();
@@ -301,7 +301,7 @@ fn velocity_on_a_lever_arm_equals_differences_of_position() {
 ///
 /// This is exact for constant velocity.
 #[test]
-fn row_of_an_earlier_measurement_equals_differences() {
+fn row_of_an_earlier_measurement_equals_finite_differences() {
     const LATER_S: f64 = 0.07;
     let mut draws = Draws::new(8);
     for _ in 0..STATES {
@@ -332,7 +332,7 @@ fn go_on(start: &State, felt: &[InertialSample]) -> (State, Transition) {
 /// blocks, a wrong factor or a missing term causes a larger error. The exception is the displacement by a gyro bias
 /// through tilting, 10 m/s^2 x 0.1^3 / 6. So each block is compared with its own size.
 #[test]
-fn transition_equals_differences_of_the_model() {
+fn transition_matrix_equals_finite_differences_of_the_model() {
     let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];
     let ones = [CREEP, SLACK, SLACK_RATE, SCALE, DEPTH, HEADING, RANGES].map(|i| (i, 1));
     let blocks: Vec<_> = blocks.into_iter().chain(ones).collect();
@@ -380,7 +380,7 @@ fn transition_equals_differences_of_the_model() {
 
 /// Factors propagated by the transition are the factors of F P F^T.
 #[test]
-fn transition_of_factors_equals_f_p_ft() {
+fn propagated_factors_equal_the_factors_of_the_propagated_covariance() {
     use crate::filter::factors::Factors;
     let mut draws = Draws::new(10);
     for _ in 0..20 {

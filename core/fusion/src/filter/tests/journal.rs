@@ -43,7 +43,7 @@ fn drive_without_estimate_records_no_steps() {
 
 /// A clock set back by more than 10 s ends a piece exactly once, even if no later reading follows.
 #[test]
-fn piece_is_recorded_to_its_end_and_ends_once() {
+fn drive_before_a_clock_reset_is_recorded_completely_and_ends_once() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 30.0) {
@@ -63,7 +63,7 @@ fn piece_is_recorded_to_its_end_and_ends_once() {
 }
 
 #[test]
-fn clock_reset_starts_a_new_piece() {
+fn recording_of_navigation_steps_is_split_at_a_clock_reset() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 30.0).iter().chain(&rig.events(0.0, 20.0)) {

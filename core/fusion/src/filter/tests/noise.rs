@@ -34,7 +34,7 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
 ///
 /// Euler's method has an error of the order of the step.
 #[test]
-fn slack_noise_equals_an_integral_of_the_process() {
+fn slack_noise_equals_numerical_integration_of_the_slack_process() {
     let settings = Settings { slack: GaussMarkov { reach: 0.06, time_s: 10.0 }, ..Settings::default() };
     // Density of w at which s has a variance of reach^2: 4 reach^2 / T^3.
     let density = 4.0 * 0.06 * 0.06 / 1e3;
@@ -61,7 +61,7 @@ fn slack_noise_equals_an_integral_of_the_process() {
 /// In the steady state, the slack has its declared variance. After x time constants, its autocorrelation is (1 + x)
 /// e^-x.
 #[test]
-fn slack_variance_settles_at_the_declared_value() {
+fn slack_variance_converges_to_the_declared_value() {
     let settings = Settings { slack: GaussMarkov { reach: 0.3, time_s: 7.0 }, ..Settings::default() };
     let mut factors = Factors::independent([0.0; ERRORS]);
     // The epochs have different lengths, because the steady state must not depend on them.
@@ -130,7 +130,7 @@ fn white_noise_equals_monte_carlo() {
 
 /// For the time without gyro and accelerometer data, the blind noise applies.
 #[test]
-fn blind_noise_applies_without_inertial_data() {
+fn noise_for_missing_inertial_data_equals_the_configured_values() {
     let settings = Settings { blind_rate_noise: 0.03, blind_force_noise: 0.5, ..Settings::default() };
     let (_, blind) = leg(&settings, 0.4, InertialSample { rate_radps: None, force_mps2: None });
     for axis in 0..3 {

@@ -255,7 +255,7 @@ fn factors_agree_with_100_digit_values() {
 }
 
 #[test]
-fn full_covariance_fails_cases_that_factors_pass() {
+fn full_covariance_form_fails_where_the_factored_form_is_accurate() {
     for (case, n, tolerance) in CASES {
         let is_hard = !matches!(case, "mild" | "ill_scaled");
         let [_, plain, joseph] = all(case, n);

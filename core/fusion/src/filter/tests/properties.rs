@@ -30,7 +30,7 @@ proptest! {
     ///
     /// Readings with the same time of validity leave in order of arrival.
     #[test]
-    fn readings_leave_the_window_once_in_order_of_validity(times in proptest::collection::vec(0_u64..50, 1..200), cut in 0_u64..50) {
+    fn readings_leave_the_window_once_in_order_of_valid_time(times in proptest::collection::vec(0_u64..50, 1..200), cut in 0_u64..50) {
         let mut window = Window::default();
         for (k, at) in times.iter().enumerate() {
             let taken = window.take(Waiting { at: MonoNs(*at), source: k, reading: reading(k as f64) });
@@ -99,7 +99,7 @@ proptest! {
     ///
     /// With arbitrary ranges, the fit still ends inside the tunnel.
     #[test]
-    fn fit_to_echoes_finds_their_position(
+    fn fit_to_echoes_finds_the_position_of_the_vehicle(
         (y, z) in (-2.5_f64..2.5, 1.5_f64..6.0),
         (off_y, off_z) in (-0.4_f64..0.4, -0.4_f64..0.4),
         (roll, pitch, yaw) in (-0.1_f64..0.1, -0.2_f64..0.2, -0.3_f64..0.3),

@@ -23,7 +23,7 @@ fn moving(axis: usize, speed_mps: f64) -> Eskf {
 
 /// The difference of two normal errors with an sd of 0.02 m/s each exceeds 0.11 m/s once in ten thousand times.
 #[test]
-fn moving_vehicle_is_not_at_rest_in_any_direction() {
+fn zero_velocity_update_is_skipped_for_motion_in_any_direction() {
     let turn = Vec3::new(2e-3, -4e-3, 6e-3);
     for (axis, side) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0)] {
         let mut moves = moving(axis, side * 0.115);

@@ -20,7 +20,7 @@ fn plain(profile: &Profile) -> Profile {
 proptest! {
     /// The answers with a tree are bit-identical to those without, even for rays through vertices.
     #[test]
-    fn profile_with_a_tree_gives_the_same_answers_as_without(
+    fn profile_queries_with_a_search_tree_equal_queries_without(
         radii in prop::collection::vec(1.8..2.2_f64, 25..400),
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
@@ -52,7 +52,7 @@ proptest! {
     /// tangent of half a step away from it. The longest edge of the hull in this test is a chord that passes 1.8 m
     /// from the centre, with its ends at 2.2 m.
     #[test]
-    fn excess_of_table_bounds_is_limited_by_geometry(
+    fn precomputed_distance_bounds_exceed_the_exact_values_by_a_limited_amount(
         radii in prop::collection::vec(prop_oneof![9 => 1.8..2.2_f64, 1 => Just(1.8)], 257..600),
         level in prop::option::of(0usize..32),
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
@@ -115,7 +115,7 @@ fn query_visits_few_of_many_elements() {
 }
 
 #[test]
-fn rejected_polygon_names_the_input_point() {
+fn error_of_a_rejected_polygon_names_the_input_point() {
     // The left wall has a hook whose edges run backwards after the fourth point, in any numbering of the points.
     let hooked = [[3.0, 0.0], [3.0, 4.0], [2.9, 4.0], [2.9, 0.5], [-3.0, 0.5], [-3.0, 0.0]];
     let refused = |points: &[Yz]| match Profile::polygon(points, Some([0.0, 0.2])) {

@@ -25,7 +25,7 @@ fn all() -> Vec<(&'static str, Profile)> {
 
 /// The expected values are derived from the figures of Jorge et al. 2021.
 #[test]
-fn ceran_has_the_dimensions_of_the_errata() {
+fn ceran_tunnel_has_the_dimensions_derived_from_the_paper() {
     let ceran = ceran().unwrap();
     assert!((ceran.perimeter_m() - 35.90).abs() < 0.005, "{}", ceran.perimeter_m());
     assert!((ceran.reference()[1] - 3.092).abs() < 0.0005);

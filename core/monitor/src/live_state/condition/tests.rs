@@ -80,7 +80,7 @@ fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
 }
 
 #[test]
-fn failing_turn_within_v_max_is_reported_until_the_forecast_meets_the_target() {
+fn condition_is_turn_fails_only_while_the_forecast_exceeds_the_target() {
     let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };
     let told = |t_m| LiveState { advice: Some(forecast(t_m)), ..state() }.condition();
     assert_eq!([told(0.6), told(0.4)], [Condition::TurnFails, Condition::Good]);
@@ -150,7 +150,7 @@ fn sensor_is_ok_stalled_or_silent_by_its_readings() {
 /// Heads are up to half a metre before or behind the origin. Coverage counts as long as a head can be inside
 /// the tunnel.
 #[test]
-fn condition_is_outside_only_if_no_head_can_be_inside() {
+fn condition_is_outside_the_tunnel_only_if_no_head_can_be_inside() {
     let at = |x_m: f64| LiveState { chainage_m: Some(x_m), length_m: 100.0, heads_reach_m: 0.5, ..state() };
     let shown = [-0.6, -0.4, 50.0, 100.4, 100.6].map(|x_m| at(x_m).condition());
     let [before, inside @ .., beyond] = shown;

@@ -95,7 +95,7 @@ fn all_of(causes: &[Cause]) -> Causes {
 
 /// At angles assumed to be hidden, losses are due to occlusion, unless other pings there do detect the wall.
 #[test]
-fn loss_at_hidden_angle_is_missing_once_others_return() {
+fn loss_at_hidden_angle_is_a_missing_return_once_other_pings_return() {
     let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
     let aim = Some(Aim { x_m: 3.0, arc_m: 2.0 });
     let lost = |loss: Loss| away(5, Outcome::Lost(loss, aim));
@@ -123,7 +123,7 @@ fn loss_at_hidden_angle_is_missing_once_others_return() {
 /// The head looks to the left, at wall 3 m away, and the vehicle is turned to the left by 0.1 rad. The beam
 /// then meets the wall 3 tan 0.1 m astern.
 #[test]
-fn lost_ping_is_missing_at_its_aim_with_all_causes() {
+fn lost_ping_is_a_missing_sample_at_its_aim_with_all_causes() {
     let profile = pipe();
     let [y_m, z_m] = profile.reference();
     let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.1);
@@ -235,7 +235,7 @@ impl Dive {
 }
 
 #[test]
-fn silent_head_is_missing_at_its_extrapolated_angles() {
+fn missing_samples_of_a_silent_head_are_at_its_extrapolated_angles() {
     let mut dive = Dive::new();
     assert_eq!(dive.beat(10.2, true).len(), 0, "the head may still ping");
     // The missing samples are those of one second, then those of two.

@@ -79,7 +79,7 @@ fn garbled_stamp_affects_only_its_own_sample() {
 }
 
 #[test]
-fn stopped_clock_moves_few_samples_and_restarted_clock_none() {
+fn stopped_device_clock_corrects_few_sample_times_and_restarted_clock_none() {
     let none = vec![0; 4000];
     let stuck = times(&none, |k| in_step(k.min(1000)));
     let put_back = stuck.iter().filter(|(made, at)| made != at).count();

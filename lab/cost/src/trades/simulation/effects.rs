@@ -105,13 +105,13 @@ mod tests {
         [[effects.d]]\nz = 1\n\n[[effects.d]]\nz = 2\n";
 
     #[test]
-    fn effects_are_found_in_each_of_their_forms() {
+    fn effects_are_found_in_every_toml_notation() {
         assert_eq!(named(TEXT), ["a", "b", "c", "d"]);
         assert_eq!(named("[trajectory]\na = 1\n"), [""; 0]);
     }
 
     #[test]
-    fn leaving_out_removes_exactly_that_effect() {
+    fn leaving_out_an_effect_removes_only_that_effect() {
         for effect in ["a", "b", "c", "d"] {
             let rest: Vec<String> = named(TEXT).into_iter().filter(|name| name != effect).collect();
             let text = without(TEXT, effect).unwrap();
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn ray_count_is_set_in_every_form() {
+    fn ray_count_is_set_in_every_notation_of_the_beam_effect() {
         for (beam, with) in [
             ("beam_cone = {}", "beam_cone = { rays = 4 }"),
             ("beam_cone = { sensors = [\"a\"] }", "beam_cone = { rays = 4, sensors = [\"a\"] }"),

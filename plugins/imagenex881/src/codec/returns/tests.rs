@@ -92,7 +92,7 @@ fn value_beyond_its_bits_is_not_encoded() {
 }
 
 #[test]
-fn echo_that_resembles_a_return_stays_an_echo() {
+fn echo_data_resembling_a_return_is_not_decoded_as_a_return() {
     let mut echo = [0xFC; 252];
     echo[20..33].copy_from_slice(&EXAMPLE_4);
     let header = Header { tag: Tag::Imx, ..Return::decode(&EXAMPLE_4, None).unwrap().header };

@@ -112,7 +112,7 @@ fn unsynced_time_runs_from_last_sync_to_last_tick() {
 /// Writing the queue takes seconds. A dive from ports waits 0.6 s in total. Other recordings wait while the medium
 /// makes progress.
 #[test]
-fn recording_ends_in_time_only_on_request_on_a_slow_medium() {
+fn slow_recording_is_cut_off_at_the_time_limit_only_on_request() {
     for in_time in [true, false] {
         let (medium, _flushed) = slow(5);
         let (mut port, mut handle) = Recorder::start(medium, &header(true), 16 << 20).unwrap();

@@ -74,7 +74,7 @@ fn single_ray_equals_the_base_ray_bit_for_bit() {
 }
 
 #[test]
-fn truth_stays_on_the_axis_and_perpendicular_ranges_stay_true() {
+fn beam_cone_keeps_the_true_axis_point_and_perpendicular_ranges() {
     let dive = Dive::with_head();
     let (base, first, bilinear) = (
         dive.dive(""),

@@ -141,7 +141,7 @@ fn slice_length_does_not_change_interference() {
 }
 
 #[test]
-fn heads_hear_only_their_own_frequency() {
+fn heads_receive_interference_only_on_their_own_frequency() {
     let mut dive = Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0], [0.9, 0.4, 0.0], [0.9, -0.4, 0.0]]);
     dive.vehicle = "[water]\nsound_speed_mps = 1500";
     let crossed = "[[effects.interference]]\nsensors = [\"sonar_0\", \"sonar_2\"]\n\

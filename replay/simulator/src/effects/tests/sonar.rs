@@ -66,7 +66,7 @@ fn all_effects_together_do_not_depend_on_slice_length() {
 }
 
 #[test]
-fn tables_treat_sensors_differently() {
+fn two_tables_of_one_effect_apply_to_their_own_sensors() {
     let effects = "[[effects.range_noise]]\nsensors = [\"sonar_0\"]\nsd_m = 0.01\n\
                    [[effects.range_noise]]\nsensors = [\"sonar_1\"]\nsd_share = 0.1\n";
     let dive = Dive { seconds: 60.0, ..pair() };

@@ -29,7 +29,7 @@ fn plain_tunnel_equals_the_profile_bit_for_bit() {
 }
 
 #[test]
-fn tunnel_as_built_may_differ_from_the_design() {
+fn tunnel_as_built_may_have_another_profile_than_the_design() {
     let text = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4";
     let environment = parse(text, &shapes::ceran().unwrap());
     Oracle::new(Shape::Circle(4.0)).compare(&environment, 2, 1_000, [0.0, 50.0]);
@@ -42,7 +42,7 @@ fn tunnel_as_built_may_differ_from_the_design() {
 }
 
 #[test]
-fn stations_scale_the_wall() {
+fn wall_is_scaled_between_stations_as_configured() {
     for (seed, shape) in [(4, CERAN), (5, Shape::Rectangle(9.0, 4.0))] {
         let mut oracle = Oracle::new(shape);
         oracle.stations = vec![(10.0, 1.0), (18.0, 0.6), (25.0, 0.6), (33.0, 1.2)];
