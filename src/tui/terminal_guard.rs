@@ -191,7 +191,7 @@ mod tests {
         let before = tcgetattr(&end).unwrap();
         let mut command = Command::new(std::env::current_exe().unwrap());
         command.args([
-            "tui::hold::tests::panics_with_the_terminal_taken",
+            "tui::terminal_guard::tests::panics_with_the_terminal_taken",
             "--exact",
             "--ignored",
             "--nocapture",

@@ -175,7 +175,9 @@ mod tests {
                 .1
                 .contains("2.000 s before recording: they come from another clock")
         );
-        assert!(words(Base::Record, &[(10 * S, 10 * S), (20 * S, 19 * S)]).1.contains("came late"));
+        assert!(
+            words(Base::Record, &[(10 * S, 10 * S), (20 * S, 19 * S)]).1.contains("messages arrived late")
+        );
         assert!(words(Base::Record, &[(10 * S, 9 * S), (11 * S, 8 * S)]).1.contains("go back 1 times"));
         let (times, said) =
             words(Base::Header, &[(100 * S, 100 * S), (101 * S, 501 * S), (102 * S, 502 * S)]);

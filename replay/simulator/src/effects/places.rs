@@ -151,7 +151,7 @@ mod tests {
     fn overlapping_and_empty_stretches_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(keys);
         let two = "[[effects.outliers]]\nfrom_m = 5\nto_m = 9\n[[effects.outliers]]\nfrom_m = 8\nto_m = 12";
-        assert!(refusal(two).contains("an earlier table of this effect is for, too, in this place"));
+        assert!(refusal(two).contains("which an earlier table of this effect names for this place already"));
         assert!(
             refusal("[effects.outliers]\nfrom_m = 5\nto_m = 5").contains("must be above from_m, which is 5")
         );

@@ -150,7 +150,7 @@ fn errors_in_a_recorded_trajectory_are_reported() {
         ("", "has no line with a position"),
         ("t,x\n", "has no line with a position"),
         ("0,1,2,3\n0,1,2,3\n", "line 2 has the time 0 s, which is not after the previous time"),
-        ("t,x,y,z\nt,x,y,z\n", "line 2 is \"t,x,y,z\""),
+        ("t,x,y,z\nt,x,y,z\n", "line 2 of it is \"t,x,y,z\""),
         ("0,1,2,3\n1,2,nan,3\n", "line 2"),
         ("0,1,2,3\n1,2,3\n", "expected t_s,chainage_m,y_m,z_m"),
         ("5,1,0,4\n", "takes 0 s"),
@@ -170,7 +170,7 @@ fn trajectories_that_leave_the_tunnel_or_do_not_move_are_refused() {
     assert!(why(leg).contains("leads to chainage -350 m"));
     assert!(why("kind = \"pilot\"\nstart_m = 300\nto_m = 100\nspeed_mps = 1\n").contains("start_m = 300"));
     assert!(why("kind = \"pilot\"\nto_m = 0.01\nspeed_mps = 1\n").contains("at least 0.1 m"));
-    assert!(why("kind = \"waypoints\"\n").contains("go nowhere"));
+    assert!(why("kind = \"waypoints\"\n").contains("do not move"));
     assert!(why("place_m = [0, 99]\n").contains("inside the tunnel's profile"));
 }
 

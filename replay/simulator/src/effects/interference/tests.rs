@@ -166,10 +166,14 @@ fn idealised_heads_in_one_place_do_not_hear_each_other() {
 
 #[test]
 fn single_head_is_refused() {
-    assert!(Dive::with_head().refusal("[effects.interference]").contains("has no other to hear"));
+    assert!(
+        Dive::with_head().refusal("[effects.interference]").contains("has one head; at least two are needed")
+    );
     let refusal = |keys: &str| pair().refusal(&format!("[effects.interference]\n{keys}"));
-    assert!(refusal("sensors = [\"sonar_1\"]").contains("has no other to hear"));
-    assert!(refusal("sensors = [\"sonar_1\", \"sonar_1\"]").contains("has no other to hear"));
+    assert!(refusal("sensors = [\"sonar_1\"]").contains("has one head; at least two are needed"));
+    assert!(
+        refusal("sensors = [\"sonar_1\", \"sonar_1\"]").contains("has one head; at least two are needed")
+    );
     assert!(refusal("share = -0.1").contains("from 0 to 1"));
     assert!(refusal("frequency_khz = 700").contains("is not a key here"));
 }

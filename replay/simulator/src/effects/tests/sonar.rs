@@ -83,5 +83,5 @@ fn two_tables_of_one_effect_apply_to_their_own_sensors() {
     let ((first, allowed), (second, _)) = (off(0, false), off(1, true));
     assert!((first / 0.01 - 1.0).abs() < allowed && (second / 0.1 - 1.0).abs() < allowed);
     let twice = "[[effects.range_noise]]\nsd_m = 0.01\n[[effects.range_noise]]\nsd_m = 0.02\n";
-    assert!(dive.refusal(twice).contains("an earlier table of this effect is for"));
+    assert!(dive.refusal(twice).contains("an earlier table of this effect names"));
 }

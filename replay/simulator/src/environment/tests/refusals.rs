@@ -23,7 +23,11 @@ fn too_tight_or_reversing_axes_are_refused() {
         "s.toml:2: tunnel.axis[0].radius_m = 12",
         "at least 12.1",
     );
-    refused("[[tunnel.axis]]\nradius_m = 60\nlength_m = 3\nturn_deg = 30", "length_m = 3", "beside radius_m");
+    refused(
+        "[[tunnel.axis]]\nradius_m = 60\nlength_m = 3\nturn_deg = 30",
+        "length_m = 3",
+        "excludes radius_m",
+    );
     refused("[[tunnel.axis]]\nlength_m = 60\nturn_deg = 30", "turn_deg = 30", "give radius_m");
     refused("[[tunnel.axis]]\nlength_m = 0", "length_m = 0", "0.01");
     refused("[[tunnel.axis]]\nradius_m = 60", "turn_deg", "missing");
