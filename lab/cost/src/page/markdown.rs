@@ -7,7 +7,7 @@ use crate::words::{self, append, number};
 /// The page of advice: each trade's question, advice, picture and reasons.
 pub(super) fn advice(results: &Results) -> String {
     let mut text = "# What accuracy costs\n\nAdvice for planning a survey and for setting up the program. `headrace cost` measures it and writes this \
-                    page. [Method](method.md) says how, and how certain the figures are. Costs are comparable only with each other: they \
+                    page. [Method](method.md) describes the measurement and its certainty. Costs are comparable only with each other: they \
                     differ from machine to machine.\n"
         .to_owned();
     for trade in &results.trades {

@@ -119,7 +119,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         points,
         left_out: left_out(inputs),
         oracle: OracleError {
-            how: "Voronoi vertices against lower envelopes, and arc lengths of an outline against those of rays, on sections of each scene"
+            how: "on sections of each scene, Voronoi vertices are compared with lower envelopes, and arc lengths of an outline with arc lengths of rays"
                 .to_owned(),
             size: oracle_m,
         },
@@ -385,7 +385,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
         let search = figure(exact, SEARCH);
         Some(format!(
             "Scene {scene}: the search takes {} of {} ns per return, so a tolerance can save at most {} %. A tolerance of 0.05 m saves {} ns and \
-             leaves {} m in 100 unjudged instead of {}.",
+             leaves {} m in 100 without a verdict, instead of {}.",
             number(search),
             number(exact.cost.middle),
             number(100.0 * search / exact.cost.middle),
@@ -394,7 +394,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
             number(figure(exact, "not said"))
         ))
     };
-    let by_chance = "Where positions are off by more than the tolerance (drop-outs, field), a coarser search can look more accurate by \
+    let by_chance = "If position errors exceed the tolerance (drop-outs, field), a coarser search can look more accurate by \
                      chance, because it reports a lower bound of D."
         .to_owned();
     ["ideal", "drop-outs", "field"].into_iter().filter_map(of).chain([by_chance]).collect()
@@ -409,7 +409,7 @@ fn advice(points: &[Point]) -> String {
     let planned = find(points, "drop-outs", "of the plan", None);
     format!(
         "Keep the exact search. It takes {} of {} ns per return and is within {} m of D_true in an ideal dive. A grid of 0.1 m cells is {} m \
-         off; with drop-outs it passes {} m in 100 wrongly, and the spacing that the plan predicts passes {}.",
+         off. In the scene drop-outs, the grid wrongly passes {} m in 100, and the spacing that the plan predicts wrongly passes {}.",
         number(figure(exact, SEARCH)),
         number(exact.cost.middle),
         number(exact.error()),

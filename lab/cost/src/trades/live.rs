@@ -82,7 +82,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         points,
         left_out: left_out(inputs),
         oracle: OracleError {
-            how: "the finest ring and look against a ring of another lattice of rays (0.12 degrees)"
+            how: "advice with the finest `ring_deg` and `look_m` is compared with advice from other rays, every 0.12 degrees"
                 .to_owned(),
             size,
         },
@@ -406,7 +406,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
         if let (Some((ring, coarse)), Some((tick, long))) = (pair(scene, "ring"), pair(scene, "tick")) {
             reasons.push(format!(
                 "Scene {scene}: rays every {} are the default. Rays every {} would save {} % of the loop's time, but the advised speed would be {} \
-                 m/s off instead of {}, and the finest mode of a head steps by 0.3 degrees. Ticks of {} are the default, so that an \
+                 m/s off instead of {}, and the finest mode of a head has steps of 0.3 degrees. Ticks of {} are the default, so that an \
                  operator does not wait; ticks of {} would save {} % and change the verdict of {} m in 100.",
                 ring.value,
                 coarse.value,
@@ -441,7 +441,7 @@ fn advice(points: &[Point]) -> String {
     let vertices = arcs.zip(most).map(|(arcs, most)| {
         let times = most.cost.middle / arcs.cost.middle;
         format!(
-            "A surveyed profile of {} vertices takes {times:.1} times the loop's time of a profile of arcs.",
+            "With a surveyed profile of {} vertices, the loop takes {times:.1} times as long as with a profile of arcs.",
             most.value
         )
     });

@@ -126,11 +126,11 @@ fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
         }
     })?;
     let lost = format!(
-        "without it, {:.2} mm of chainage at 7 km, and {:.1} % of a difference between samples 5 mm apart",
+        "single precision loses {:.2} mm of chainage at 7 km, and {:.1} % of the distance between samples 5 mm apart",
         1e3 * lost_m,
         100.0 * 2.0 * lost_m / 0.005
     );
-    Ok(row("places in double precision, not single", lost, &costs))
+    Ok(row("positions in double precision, not single", lost, &costs))
 }
 
 /// Compares samples packed to about four bytes with unpacked samples.
@@ -146,8 +146,10 @@ fn packing(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
         filled?;
         Ok(cpu_s * 1e9 / f64::from(metres * PER_M))
     })?;
-    let lost =
-        format!("{:.1} um of a place; {bytes:.1} bytes a sample in place of {PLAIN_BYTES}", 1e6 * moved_m);
+    let lost = format!(
+        "positions move by {:.1} um; a sample takes {bytes:.1} bytes, not {PLAIN_BYTES}",
+        1e6 * moved_m
+    );
     Ok(row("samples packed behind the vehicle", lost, &costs))
 }
 

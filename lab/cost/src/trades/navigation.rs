@@ -480,8 +480,8 @@ fn oracle(inputs: &Inputs<'_>, places: &[Place]) -> Result<OracleError, CostErro
     }
     Ok(OracleError {
         how: format!(
-            "D_true by Voronoi vertices against lower envelopes; displacements against those of a taut cable, decoded from the bytes of \
-             its emulated counter (0.5 mm a count), differ by {displacement_m:.4} m at most"
+            "for D_true, Voronoi vertices are compared with lower envelopes; true displacements differ by {displacement_m:.4} m at most from the readings \
+             of a taut cable, decoded from the bytes of its emulated counter (0.5 mm a count)"
         ),
         size: hole_m,
     })
@@ -495,8 +495,8 @@ impl Place {
 
 fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     let mut left_out = vec![LeftOut {
-        what: "knobs far from the portal, with VITA 2 and with a slack cable".to_owned(),
-        why: "epoch, window and the unit's rate are the filter's own; they are tried in the field scene of VITA 1 at 16 m, methods everywhere".to_owned(),
+        what: "settings of the filter far from the portal, with VITA 2 and with a slack cable".to_owned(),
+        why: "epoch, window and the inertial unit's rate are varied only in the field scene of VITA 1 at 16 m; all scenes compare the methods".to_owned(),
     }];
     if inputs.effort.pick(true, false) {
         left_out.push(LeftOut {

@@ -85,7 +85,9 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         points,
         left_out: left_out(inputs),
         oracle: OracleError {
-            how: format!("{MANY_RAYS} rays against {OTHER_RAYS}, which lie elsewhere within the beam"),
+            how: format!(
+                "{MANY_RAYS} rays are compared with {OTHER_RAYS} rays at other places within the beam"
+            ),
             size,
         },
         reasons,
@@ -426,14 +428,14 @@ fn features_hit(scene: &Scene) -> Result<Vec<u16>, CostError> {
 fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     let mut left_out = vec![
         LeftOut {
-            what: "steps of rays by distance".to_owned(),
-            why: "a ray in a bent or narrowing tunnel advances by what the wall's slope bounds, and ends at a root to 1e-11 m \
-                  (`LEAST_STEP_M` and `ROOT_M` of the tube): shorter steps would change no result, and longer ones would miss walls"
+            what: "step lengths of a ray".to_owned(),
+            why: "in a bent or narrowing tunnel, the bound on the wall's slope decides each step, and the ray ends within 1e-11 m of the wall \
+                  (`LEAST_STEP_M` and `ROOT_M` of the tube): shorter steps would change no result, and longer steps would miss walls"
                 .to_owned(),
         },
         LeftOut {
             what: "rays in the small pipe and the collapse".to_owned(),
-            why: "a thousand rays take minutes where walls bend or blocks lie about".to_owned(),
+            why: "a thousand rays take minutes between bent walls or fallen blocks".to_owned(),
         },
     ];
     if inputs.effort.pick(true, false) {
@@ -456,9 +458,9 @@ fn reasons(points: &[Point]) -> Vec<String> {
     };
     let rays = of_rays(1).zip(of_rays(USUAL_RAYS)).map(|(one, usual)| {
         format!(
-            "A beam has {USUAL_RAYS} rays by default. In the scene {}, D with one ray is {} m off D with {MANY_RAYS} rays; with {USUAL_RAYS} rays \
-             it is {} m off. They cost {} ns per return instead of {}. Only several rays find the edge of a boulder that cuts a beam, and D \
-             does not show that.",
+            "A beam has {USUAL_RAYS} rays by default. In the scene {}, D with one ray differs by {} m from D with {MANY_RAYS} rays; D with {USUAL_RAYS} rays \
+             differs by {} m. {USUAL_RAYS} rays cost {} ns per return, one ray {}. Only several rays find the edge of a boulder that cuts a beam; D \
+             does not show this benefit.",
             usual.scene.trim_end_matches(", rays"),
             number(one.error()),
             number(usual.error()),

@@ -90,8 +90,8 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         left_out,
         oracle: OracleError {
             how: format!(
-                "Voronoi vertices against lower envelopes, and arc lengths of an outline against those of rays, on {compared} sections of the simulated dives; D_true, which no function of the plan \
-                 computes, checks the promised T"
+                "on {compared} sections of the simulated dives, Voronoi vertices are compared with lower envelopes, and arc lengths of an outline with arc lengths of rays; D_true checks the \
+                 promised T, because no function of the plan computes D_true"
             ),
             size: oracle_m,
         },
@@ -111,8 +111,8 @@ fn quick_left_out() -> LeftOut {
 
 fn reasons(points: &[Point]) -> Vec<String> {
     let mut reasons = vec![format!(
-        "The hours are for the whole tunnel: there at the planned speed, {:.0} % of it again at that speed, and back at {WAY_BACK_MPS} m/s. \
-         survey.csv lists the three parts. For a vehicle off the middle, D_true is the largest of up to five positions.",
+        "The hours are for the whole tunnel: out at the planned speed, a second pass over {:.0} % of it at that speed, and back at {WAY_BACK_MPS} m/s. \
+         survey.csv lists the three parts. If the vehicle is off the middle, D_true is the largest value of up to five positions.",
         100.0 * AGAIN_SHARE
     )];
     let shipped = points.iter().find(|point| point.is_default && point.scene == HEADS);

@@ -31,9 +31,9 @@ pub(super) fn reasons(points: &[Point]) -> Vec<String> {
     {
         let [usual, cable, direct] = [usual, cable, direct].map(|worst| worst.map(number));
         reasons.push(format!(
-            "The filter with sonar returns is the default, even where a cheaper method knows the displacement as well. In its worst scene it \
-             knows the lateral position to {} m; the cable alone knows it to {} m and `direct` to {} m. Its displacements lie within two of its \
-             standard deviations in {} %, instead of {} and {} %. No section may pass without such a standard deviation.",
+            "The filter with sonar returns is the default, even where a cheaper method knows the displacement equally well. In its worst scene it \
+             knows the lateral position to {} m; the cable alone knows it to {} m and `direct` to {} m. There, {} % of its displacements are \
+             within two of its standard deviations, but only {} and {} % of the others' displacements. A section can pass only with such a standard deviation.",
             usual[0], cable[0], direct[0], usual[1], cable[1], direct[1]
         ));
     }
@@ -63,8 +63,8 @@ pub(super) fn advice(points: &[Point], scene: &str) -> String {
     };
     let figure = |point: &Point, name: &str| figure(point, name).unwrap_or(f64::NAN);
     format!(
-        "Use the sonar returns for navigation. In {scene} they reduce the error of the lateral position to {:.3} m from {:.2} m by cable \
-         alone, and the error of D to {:.3} m from {:.3} m, for {:.1} ms more CPU time per second of dive.",
+        "Use the sonar returns for navigation. In {scene} they reduce the error of the lateral position to {:.3} m, from {:.2} m with \
+         the cable alone, and the error of D to {:.3} m, from {:.3} m, for {:.1} ms more CPU time per second of dive.",
         figure(usual, "position across"),
         figure(cable, "position across"),
         figure(usual, "abs(D - D_true), 95th percentile"),
