@@ -33,7 +33,7 @@ export function Announcer() {
 /** Text if nothing limits the speed. */
 const UNBOUNDED: Partial<Record<Condition, string>> = {
   passed: "the wall here has passed",
-  going_back: "the way back counts, too: keep within the limit",
+  going_back: "up to max, the drive back counts as a pass",
   outside: "no verdicts here",
 };
 
