@@ -88,8 +88,8 @@ fn trimmed_log_states_the_cut_and_keeps_the_verdicts_inside() {
     }
     // A removed part is reported only if data existed there.
     for (name, further, said, unsaid) in [
-        ("later.mcap", ["--from", "20s"], "before was removed", "after was removed"),
-        ("earlier.mcap", ["--to", "20s"], "after was removed", "before was removed"),
+        ("later.mcap", ["--from", "20s"], "earlier data was cut off", "later data was cut off"),
+        ("earlier.mcap", ["--to", "20s"], "later data was cut off", "earlier data was cut off"),
     ] {
         trim(&folder, name, &further);
         let losses = folder.replay(name, &[]).1["log"]["losses"].to_string();
