@@ -20,7 +20,7 @@ pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure>
     let _phase = Phase::start("worth");
     let mut progress = Progress::start();
     Ok(measure(scenes, &mut |dived, most| {
-        progress.step(&format!("{dived} of at most {most} simulated dives"))
+        progress.step(&format!("{dived} of at most {most} simulated dives"));
     })?)
 }
 

@@ -198,7 +198,9 @@ fn calibrate_finds_only_the_late_head() {
 /// is reported, because either it or the wall is wrong.
 #[test]
 fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
-    for (share, says) in [(0.04, "ranges are -"), (-0.04, "ranges are +")] {
+    for (share, says) in
+        [(0.04, "ranges differ from this profile by -"), (-0.04, "ranges differ from this profile by +")]
+    {
         let folder = folder(true, &filed(), &format!("sound_speed_error = {{ share = {share} }}\n"));
         let answer = folder.headrace(&["calibrate", "dive.mcap"]);
         assert!(answer.stdout.contains("a fault was found, see above"), "{}", answer.stdout);
