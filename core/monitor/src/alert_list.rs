@@ -3,7 +3,7 @@
 //! Each situation has one alert, whose number never changes. Conditions are checked at each update. Missed
 //! stretches are added when their sections are judged. Commands take effect at their place in the packet
 //! stream. The list is therefore the same in a replay, however the stream was cut into ticks. The list holds
-//! figures, no texts: [`words`] makes the texts for display. `docs/reference/alerts.md` has the table.
+//! figures, no texts: [`texts`] makes the texts for display. `docs/reference/alerts.md` has the table.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
