@@ -45,7 +45,7 @@ describe("display", () => {
   it("shows v_max with its reason, and the wall", () => on({}, async ({ page }) => {
     await condition(page, "good");
     assert.match(await page.locator(".most .value").innerText(), /0\.24/);
-    assert.match(await page.locator(".why").innerText(), /slower helps/);
+    assert.match(await page.locator(".why").innerText(), /go slower/);
     assert.match(await page.locator(".chainage").innerText(), /^0\+06\d\.\d$/);
     // The stretch from 0+012 to 0+018 was missed: holes over T are yellow, its outline is red, and the rest is blue to grey.
     await page.waitForFunction(() => !document.querySelector(".condition.old"));
@@ -407,7 +407,7 @@ describe("keyboard", () => {
     await page.keyboard.press(" ");
     await page.locator(".paused").waitFor({ state: "detached" });
     assert.equal(mock.control({}).playback.paused, false);
-    assert.ok(await page.getByRole("button", { name: "Acknowledge all" }).isDisabled());
+    assert.ok(await page.getByRole("button", { name: "Ack all" }).isDisabled());
   }));
 });
 

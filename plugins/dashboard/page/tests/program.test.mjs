@@ -61,7 +61,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     const one = await open(chromium, url), other = await open(chromium, url);
     await one.page.locator('.condition[data-condition="good"]').waitFor(LONG);
     assert.match(await one.page.locator(".most .value").innerText(), /0\.\d\d/);
-    assert.match(await one.page.locator(".why").innerText(), /slower helps/);
+    assert.match(await one.page.locator(".why").innerText(), /go slower/);
     const missed = one.page.locator('.alert.open[data-kind="missed"]');
     await missed.waitFor(LONG);
     const number = await missed.first().getAttribute("data-number");
@@ -95,7 +95,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     const report = JSON.parse(execFileSync(BIN, ["replay", join(out, "dive.mcap"), "--json"], { maxBuffer: 1 << 28 }));
     const alert = report.alert_list.find((alert) => alert.number === Number(number));
     assert.deepEqual([alert.kind, alert.state, alert.acknowledged?.by], ["missed", "cleared", "page"]);
-    assert.ok(await page.getByRole("button", { name: "Acknowledge all" }).isDisabled());
+    assert.ok(await page.getByRole("button", { name: "Ack all" }).isDisabled());
     // The program is killed and restarted. The page reports the loss, and recovers by itself.
     await stop(replay.child);
     await page.locator(".word", { hasText: "NO CONNECTION" }).waitFor();

@@ -36,7 +36,7 @@ export function Alerts() {
         <span class={`count${waiting > 0 ? " waiting" : ""}`}>{waiting > 0 ? `${waiting} not acknowledged` : list.length > 0 ? `${list.length} acknowledged` : "none"}</span>
       </div>
       <div class="buttons">
-        <button type="button" class="all" disabled={!may || waiting === 0} onClick={() => acknowledge(0)} title="Shift+A">Acknowledge all</button>
+        <button type="button" class="all" disabled={!may || waiting === 0} onClick={() => acknowledge(0)} title="Acknowledge all (Shift+A)">Ack all</button>
         <button type="button" disabled={!may} onClick={silence} title="Silence for 30 s (S)">Silence</button>
         <SoundButtons />
       </div>
