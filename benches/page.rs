@@ -22,7 +22,7 @@ use headrace_dashboard::collector::Collector;
 use headrace_dashboard::{HeadSite, Mode, Page, SensorSite, Settings, Site, Voices};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
-use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
+use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
 use headrace_sensor::device::{Direction, Sense};
 use headrace_simulator::{START, Scene, Simulation};
@@ -196,12 +196,12 @@ fn dive(scene: &Scene, messages: &[Kept], seconds: u64, beside: Beside) -> Measu
     is_over.store(true, Ordering::Relaxed);
     if let Some(page) = page {
         // This message follows the feed's schema, but its summary is empty.
-        let digest = format!("{:016x}", armed.digest());
+        let digest = format!("{:016x}", armed.view().digest());
         page.end(Some(json!({"type": "end", "digest": digest, "exit": 0, "summary": {}, "way": null})));
     }
     let viewers = viewers.map(Viewers::end);
-    measured.samples = armed.tally().samples;
-    measured.digest = armed.digest();
+    measured.samples = armed.view().tally().samples;
+    measured.digest = armed.view().digest();
     measured.notices_dropped = notices.dropped();
     measured.page = counts.into_iter().chain(viewers).collect::<Vec<_>>().join("; ");
     measured

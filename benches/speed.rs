@@ -9,9 +9,10 @@
 
 use std::collections::HashMap;
 use std::hint::black_box;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use bevy_ecs::prelude::{ResMut, Resource};
+use bevy_ecs::prelude::{Res, Resource};
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule, SingleThreadedExecutor};
 use bevy_ecs::world::World;
 use headrace_coverage::hole::FARTHEST_M;
@@ -22,10 +23,13 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::shapes;
-use headrace_monitor::alert_list::AlertList;
+use headrace_monitor::merge::MAX_TICK_BYTES;
+use headrace_monitor::outlet::Outlet;
+use headrace_monitor::part::Part;
 use headrace_monitor::resources::Coverage;
 use headrace_monitor::run::Loop;
 use headrace_monitor::stage::Stage;
+use headrace_monitor::view::DiveView;
 use headrace_monitor::{App, SourceSpec};
 use headrace_sensor::codec::CodecCounts;
 use headrace_sensor::device::{Decoder, Direction};
@@ -99,21 +103,41 @@ impl Decoder for Nothing {
     }
 }
 
-/// End time of each stage in all ticks so far.
-#[derive(Resource, Default)]
-struct Ends(Vec<Instant>);
+/// End times of stages, in the order in which they ended.
+#[derive(Resource, Clone)]
+struct Ends(Arc<Mutex<Vec<(String, Instant)>>>);
 
-fn note(mut ends: ResMut<'_, Ends>) {
-    ends.0.push(Instant::now());
+/// Adds a system after each stage of a world that records the stage's end.
+fn note_stages<S: Stage>(part: &mut Part<S>, ends: &Ends) {
+    part.insert_resource(ends.clone());
+    for stage in S::ALL {
+        let name = format!("{stage:?}");
+        part.add_systems_after(*stage, move |ends: Res<'_, Ends>| {
+            ends.0.lock().unwrap().push((name.clone(), Instant::now()));
+        });
+    }
 }
 
-/// A loop that records the end of each stage.
-fn noting(scene: &Scene, ticks: usize) -> Loop {
-    let mut app = app(scene, true);
-    app.insert_resource(Ends(Vec::with_capacity(ticks * Stage::ALL.len())));
-    for stage in Stage::ALL {
-        app.add_systems_after(stage, note);
+/// Records when the alerter has finished and the outlets are next.
+struct Alerted(Ends);
+
+impl Outlet for Alerted {
+    fn publish(&mut self, _: &DiveView<'_>) -> usize {
+        self.0.0.lock().unwrap().push((ALERTER.to_owned(), Instant::now()));
+        MAX_TICK_BYTES
     }
+}
+
+/// Name of the alerter among the stages.
+const ALERTER: &str = "Alerter";
+
+/// A loop that records the end of each stage.
+fn noting(scene: &Scene, ends: &Ends) -> Loop {
+    let mut app = app(scene, true);
+    note_stages(&mut app.placer, ends);
+    note_stages(&mut app.adviser, ends);
+    note_stages(&mut app.surveyor, ends);
+    app.add_outlet(Alerted(ends.clone()));
     app.arm(scene.vehicle.navigation()).unwrap()
 }
 
@@ -184,7 +208,7 @@ fn whole_loop() {
     let full = best(|| {
         let mut dive = armed(&scene, true);
         ticks = run(&mut dive, &messages);
-        samples = dive.tally().samples;
+        samples = dive.view().tally().samples;
         ticks.iter().sum()
     });
     let bare = best(|| run(&mut armed(&scene, false), &messages).iter().sum());
@@ -232,22 +256,31 @@ fn messages_of(scene: &Scene) -> (f64, Vec<Kept>) {
 /// Duration of each stage in each tick of a dive, us, and the loop after the dive.
 ///
 /// The first duration also contains all work before the first stage: filling rings, merging, and starting the
-/// schedule.
-fn spans(scene: &Scene) -> (Loop, Vec<Vec<f64>>) {
+/// schedule. Stages that run several times in a tick have the sum of their durations.
+fn spans(scene: &Scene) -> (Loop, Vec<(String, Vec<f64>)>) {
     let (_, messages) = messages_of(scene);
-    let last = messages.last().map_or(START, |message| message.at);
-    let mut dive = noting(scene, usize::try_from(last.since(START).0 / TICK.0).unwrap() + 2);
-    // Arming runs one tick, whose stages are recorded, too.
-    let armed = dive.resource::<Ends>().unwrap().0.len();
+    let ends = Ends(Arc::default());
+    let mut dive = noting(scene, &ends);
+    // Arming runs a tick, too.
+    ends.0.lock().unwrap().clear();
     let mut begins = Vec::new();
     run_noting(&mut dive, &messages, &mut begins);
-    let ends = &dive.resource::<Ends>().unwrap().0[armed..];
-    let mut spans = vec![Vec::new(); Stage::ALL.len()];
-    for (begin, ends) in begins.iter().zip(ends.chunks(Stage::ALL.len())) {
+    let mut spans: Vec<(String, Vec<f64>)> = Vec::new();
+    let ends = core::mem::take(&mut *ends.0.lock().unwrap());
+    let mut ends = ends.into_iter().peekable();
+    for (tick, begin) in begins.iter().enumerate() {
         let mut before = *begin;
-        for (span, end) in spans.iter_mut().zip(ends) {
-            span.push((*end - before).as_secs_f64() * 1e6);
-            before = *end;
+        while let Some((name, end)) =
+            ends.next_if(|(_, end)| begins.get(tick + 1).is_none_or(|next| end <= next))
+        {
+            let place = spans.iter().position(|(other, _)| *other == name).unwrap_or_else(|| {
+                spans.push((name, Vec::new()));
+                spans.len() - 1
+            });
+            let span = &mut spans[place].1;
+            span.resize(tick + 1, 0.0);
+            span[tick] += (end - before).as_secs_f64() * 1e6;
+            before = end;
         }
     }
     (dive, spans)
@@ -263,15 +296,15 @@ fn percentiles(mut span: Vec<f64>) -> String {
 /// Prints percentiles of each stage over the ticks of a dive.
 fn by_stage() {
     let (_, spans) = spans(&scenes::scene(SCENE));
-    let whole_us: f64 = spans.iter().flatten().sum();
-    for (stage, span) in Stage::ALL.into_iter().zip(spans) {
+    let whole_us: f64 = spans.iter().flat_map(|(_, span)| span).sum();
+    for (number, (stage, span)) in spans.into_iter().enumerate() {
         let share = span.iter().sum::<f64>() / whole_us;
-        let what = format!("stage {stage:?}{}", if stage == Stage::Decode { ", merge included" } else { "" });
+        let what = format!("stage {stage}{}", if number == 0 { ", merge included" } else { "" });
         row(&what, &percentiles(span), "all stages", share);
     }
 }
 
-/// Cost of the alert list stage in a dive with a missed stretch every four metres, compared with a dive that misses
+/// Cost of the alerter in a dive with a missed stretch every four metres, compared with a dive that misses
 /// nothing.
 fn alerts() {
     const PAIRS: usize = 40;
@@ -280,17 +313,17 @@ fn alerts() {
     let leg = |(distance_m, speed_mps): (u32, f64)| {
         format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n")
     };
-    let of_advise = |fast_mps: f64| {
+    let of_alerter = |fast_mps: f64| {
         let legs = [(1, fast_mps), (3, 0.08)].map(leg).concat().repeat(PAIRS);
         let (dive, spans) = spans(&scenes::scene(&format!("{WAY}{legs}")));
-        let list = dive.resource::<AlertList>().unwrap();
-        let span = Stage::ALL.into_iter().zip(spans).find(|(stage, _)| *stage == Stage::Advise).unwrap().1;
+        let list = dive.view().alert_list();
+        let span = spans.into_iter().find(|(stage, _)| stage == ALERTER).unwrap().1;
         (list.raised(), list.iter().count(), span)
     };
-    let [many, few] = [0.4, 0.08].map(of_advise);
+    let [many, few] = [0.4, 0.08].map(of_alerter);
     let mean = |span: &[f64]| span.iter().sum::<f64>() / span.len() as f64;
     row(
-        &format!("stage Advise, {} alerts raised, {} in the list at the end", many.0, many.1),
+        &format!("alerter, {} alerts raised, {} in the list at the end", many.0, many.1),
         &format!("mean {:.2} us, {}", mean(&many.2), percentiles(many.2.clone())),
         &format!("{} raised: mean {:.2} us, {}", few.0, mean(&few.2), percentiles(few.2.clone())),
         mean(&many.2) / mean(&few.2),
@@ -368,7 +401,6 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
             to_m: length_m,
             node_m: 0.5,
         }),
-        relief: headrace_coverage::Relief::default(),
         unsure: None,
         lacks: headrace_coverage::MissingSamples::default(),
     };

@@ -1,5 +1,4 @@
-//! A custom outlet: a plugin with a system that puts flagged sections into a bounded queue. Another thread prints
-//! them.
+//! A custom outlet: it puts flagged sections into a bounded queue. Another thread prints them.
 //!
 //! Run: `cargo run --example own_outlet [LOG.mcap]`. Without a log it uses a golden log of a vehicle that moves too
 //! fast.
@@ -11,16 +10,16 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use bevy_ecs::prelude::{Res, Resource};
 use crossbeam::queue::ArrayQueue;
 use headrace::devices::KINDS;
 use headrace_config::Document;
 use headrace_coverage::{Cause, Judgement};
 use headrace_geometry::time::MonoNs;
-use headrace_monitor::messages::{Notice, Notices};
+use headrace_monitor::merge::MAX_TICK_BYTES;
+use headrace_monitor::messages::Notice;
+use headrace_monitor::outlet::Outlet;
 use headrace_monitor::pilot_text::station;
-use headrace_monitor::resources::Coverage;
-use headrace_monitor::stage::Stage;
+use headrace_monitor::view::DiveView;
 use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::player::Player;
@@ -44,35 +43,35 @@ struct Queue {
     ended: AtomicBool,
 }
 
-#[derive(Clone, Resource)]
 struct FlagOutlet(Arc<Queue>);
 
 impl Plugin for FlagOutlet {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.insert_resource(self.clone());
-        app.add_systems(Stage::Publish, publish);
+        app.add_outlet(Self(Arc::clone(&self.0)));
         Ok(())
     }
 }
 
-/// Queues new flags; runs at the end of each tick.
-///
-/// The loop never waits: flags that don't fit in the queue are dropped and counted.
-#[expect(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
-fn publish(notices: Res<'_, Notices>, coverage: Res<'_, Coverage>, outlet: Res<'_, FlagOutlet>) {
-    let sections = &coverage.sections;
-    for notice in &notices.0 {
-        let Notice::Section { section: index, at, change: Judgement::Raised } = *notice else { continue };
-        let Some(section) = sections.get(index) else { continue };
-        let flag = Flag {
-            at,
-            from_m: sections.bounds_m(index).0,
-            hole_m: section.hole.map_or(f64::INFINITY, |hole| hole.diameter_m),
-            cause: section.evidence.map(|evidence| evidence.cause),
-        };
-        if outlet.0.flags.push(flag).is_err() {
-            outlet.0.dropped.fetch_add(1, Ordering::Relaxed);
+impl Outlet for FlagOutlet {
+    /// Queues new flags; called at the end of each tick.
+    ///
+    /// The loop never waits: flags that don't fit in the queue are dropped and counted.
+    fn publish(&mut self, dive: &DiveView<'_>) -> usize {
+        let sections = &dive.coverage().sections;
+        for notice in dive.notices() {
+            let Notice::Section { section: index, at, change: Judgement::Raised } = notice else { continue };
+            let Some(section) = sections.get(index) else { continue };
+            let flag = Flag {
+                at,
+                from_m: sections.bounds_m(index).0,
+                hole_m: section.hole.map_or(f64::INFINITY, |hole| hole.diameter_m),
+                cause: section.evidence.map(|evidence| evidence.cause),
+            };
+            if self.0.flags.push(flag).is_err() {
+                self.0.dropped.fetch_add(1, Ordering::Relaxed);
+            }
         }
+        MAX_TICK_BYTES
     }
 }
 

@@ -147,7 +147,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         port.send(received, bytes.as_bytes())?;
         dive.tick(received);
         println!("packet {number}: {bytes:?}");
-        for event in dive.readings() {
+        for event in dive.view().readings() {
             println!("    valid at {:.2} s: {:?}", event.valid_at.as_secs_f64(), event.reading);
         }
     }

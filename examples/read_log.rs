@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     println!("{}, target {} m", vehicle.name, vehicle.target_m);
     println!("{:>10}  {:>8}  {:>6}  verdict", "from", "hole m", "sd m");
-    let sections = &dive.coverage().sections;
+    let sections = &dive.view().coverage().sections;
     let first = sections.index_of(0.0);
     for index in (first..).take(sections.len()) {
         let Some(section) = sections.get(index) else { continue };

@@ -9,7 +9,7 @@ use headrace_monitor::App;
 use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleInput, ConsolePort};
 use headrace_monitor::entities::HeadSpecification;
 use headrace_monitor::head_descriptions::HeadDescriptions;
-use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
+use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::report::{LineReport, Report};
 use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
@@ -322,8 +322,10 @@ impl Dive {
         let mut progress = Progress::start();
         let driven = drive(&mut self.armed, &mut |dive| {
             if watch.is_quiet() {
-                let (tally, share) = (dive.tally(), feeds::share(span, dive.now()));
-                progress.at(|| (format!("{} packets, {} samples", tally.packets, tally.samples), share));
+                let (tally, share) = (dive.view().tally(), feeds::share(span, dive.now()));
+                progress.at(|| {
+                    (format!("{} packets, {} samples", dive.view().placed().packets(), tally.samples), share)
+                });
             }
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);

@@ -96,7 +96,7 @@ impl Follower for MavlinkOut {
             Priority::Warning => Gravity::Warning,
             Priority::Caution => Gravity::Caution,
         };
-        let around = dive.surroundings();
+        let around = dive.view().surroundings();
         let (text, advice) = (alert.text(&around), alert.advice(&around));
         let text = if advice.is_empty() { text } else { format!("{text} -> {advice}") };
         for frame in self.speaker.text(gravity, &text) {
@@ -105,7 +105,7 @@ impl Follower for MavlinkOut {
     }
 
     fn tick(&mut self, dive: &Loop) {
-        let state = dive.live_state();
+        let state = dive.view().live_state();
         let now = state.now;
         if is_due(&mut self.heartbeat, now, HEARTBEAT_EVERY) {
             let frame = self.speaker.heartbeat(state.at.is_some());
@@ -114,7 +114,7 @@ impl Follower for MavlinkOut {
         if is_due(&mut self.figures, now, FIGURES_EVERY) {
             // The milliseconds wrap after 49 days, as in every MAVLink clock.
             let time_ms = u32::try_from(now.0 / 1_000_000 % (1 << 32)).unwrap_or(0);
-            let unacknowledged = dive.alert_list().counts().unacknowledged;
+            let unacknowledged = dive.view().alert_list().counts().unacknowledged;
             for (name, value) in figures(state, unacknowledged) {
                 if let Some(frame) = self.speaker.figure(name, time_ms, value) {
                     self.send(frame);

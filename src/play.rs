@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crossbeam::channel::{Receiver, Sender};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::outlet::NoticeReceiver;
+use headrace_monitor::notice_outlet::NoticeReceiver;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
 use headrace_replay::drive::Pace;

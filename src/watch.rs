@@ -114,7 +114,9 @@ impl Watch {
             Notice::Section { at, .. } | Notice::Run { at, .. } | Notice::Listed { at, .. } => *at,
             Notice::Advice(entry) => entry.at,
             Notice::Note(note) => note.at,
-            Notice::Alert(kind, source) => dive.alerts().get(*kind, *source).map_or(MonoNs(0), |a| a.since),
+            Notice::Alert(kind, source) => {
+                dive.view().alerts().get(*kind, *source).map_or(MonoNs(0), |a| a.since)
+            }
         };
         let mut told = Vec::new();
         self.teller.hear(notice, dive, &mut |one| told.push(one));
@@ -127,7 +129,7 @@ impl Watch {
         if self.printer.is_none() {
             return;
         }
-        let state = dive.live_state();
+        let state = dive.view().live_state();
         let mut told = Vec::new();
         self.teller.tick(state, dive, &mut |one| told.push(one));
         self.tell(state.now, &told, dive);
@@ -198,7 +200,8 @@ impl Watch {
         self.shown = None;
         self.teller.forget();
         self.followers.iter_mut().for_each(|follower| follower.stopped(dive, time, ended));
-        let (tick, samples, digest) = (dive.ticks(), dive.tally().samples, format!("{:016x}", dive.digest()));
+        let (tick, samples, digest) =
+            (dive.ticks(), dive.view().tally().samples, format!("{:016x}", dive.view().digest()));
         match self.show {
             Show::Nothing | Show::Followers => {}
             Show::JsonLines => {
@@ -223,7 +226,7 @@ impl Watch {
         self.followers.iter_mut().for_each(|follower| follower.end(dive));
         if self.printer.is_some() {
             let mut told = Vec::new();
-            self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
+            self.teller.end(&dive.view().coverage().sections, &mut |one| told.push(one));
             self.tell(dive.now(), &told, dive);
         }
         if let Some(printer) = &mut self.printer {
@@ -251,7 +254,7 @@ impl Watch {
             line.lamp = if is_alarm { Some(Lamp::Red) } else { line.lamp };
         }
         if self.show == Show::JsonLines {
-            let mut value = match serde_json::to_value(dive.live_state_json()) {
+            let mut value = match serde_json::to_value(dive.view().live_state_json()) {
                 Ok(value) => value,
                 Err(error) => json!({"error": error.to_string()}),
             };

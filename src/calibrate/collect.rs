@@ -125,7 +125,7 @@ pub(crate) fn collect(
     let sensors = dive.sensors();
     let mut events: Vec<Event> = Vec::new();
     drive(&mut dive, &mut Until { feed, end }, Pace::default(), &mut |dive| {
-        let heard = dive.readings();
+        let heard = dive.view().readings();
         events.extend(heard.iter().filter(|event| is_wanted(event.received)));
         progress(events.len());
     })?;

@@ -24,8 +24,8 @@ pub(super) struct AlertRow {
 
 /// Live alerts, most urgent first, and the number of those left out.
 pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
-    let around = dive.surroundings();
-    let (shown, hidden) = dive.alert_list().shown();
+    let around = dive.view().surroundings();
+    let (shown, hidden) = dive.view().alert_list().shown();
     let row = |alert: &&ListedAlert| AlertRow {
         number: alert.number,
         priority: match alert.priority {

@@ -108,7 +108,7 @@ impl FrameBuilder {
 
     pub(super) fn tick(&mut self, dive: &Loop) {
         let mut told = Vec::new();
-        let state = dive.live_state();
+        let state = dive.view().live_state();
         self.teller.tick(state, dive, &mut |one| tell(&one, dive, &mut told));
         for line in told {
             self.tell(line);
@@ -139,7 +139,7 @@ impl FrameBuilder {
     }
 
     pub(super) fn shot(&mut self, dive: &Loop, stopped: Option<Stop>) -> ScreenFrame {
-        let state = *dive.live_state();
+        let state = *dive.view().live_state();
         let (profile, heads) = (&dive.mission().profile, dive.head_descriptions());
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
@@ -150,7 +150,7 @@ impl FrameBuilder {
         let (alerts, alerts_hidden) = alerts::rows(dive);
         ScreenFrame {
             vehicle: self.vehicle.clone(),
-            time: dive.tally().span.map_or(DurNs(0), |(begun, _)| DurNs(state.now.since(begun).0.max(0))),
+            time: dive.view().span().map_or(DurNs(0), |(begun, _)| DurNs(state.now.since(begun).0.max(0))),
             stopped,
             status: status_line(&state, profile, heads, &name),
             reason,
@@ -165,7 +165,7 @@ impl FrameBuilder {
     }
 
     fn sensors(&mut self, state: &LiveState, dive: &Loop) -> Vec<SensorRow> {
-        let counts: Vec<u64> = dive.health().map(|health| health.readings).collect();
+        let counts: Vec<u64> = dive.view().health().iter().map(|health| health.readings).collect();
         let [before, last] = &mut self.counted;
         let is_due = last.as_ref().is_none_or(|(at, _)| state.now.since(*at).0 >= RATE_OVER.0);
         let from = before.as_ref().or(last.as_ref());
@@ -191,7 +191,7 @@ impl FrameBuilder {
     }
 
     fn wall(&mut self, state: &LiveState, dive: &Loop) -> WallNews {
-        let sections = &dive.coverage().sections;
+        let sections = &dive.view().coverage().sections;
         let clock = self.clock.get_or_insert_with(|| Clock::of(&dive.mission().profile));
         let indexes: Vec<i64> = match self.changed.take() {
             None => (0..).take(sections.len()).collect(),

@@ -63,7 +63,7 @@ pub(super) struct Cell {
 impl Cell {
     /// Section with this index; `None` if there is no such section.
     pub(super) fn of(index: i64, dive: &Loop, clock: &Clock) -> Option<Self> {
-        let coverage = dive.coverage();
+        let coverage = dive.view().coverage();
         let sections = &coverage.sections;
         let section = sections.get(index)?;
         let known = match section.verdict {

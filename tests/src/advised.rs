@@ -3,7 +3,6 @@
 use headrace_geometry::time::DurNs;
 use headrace_monitor::App;
 use headrace_monitor::advice_log::AdviceEntry;
-use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_replay::drive::{Coming, Pace, PacketSource, drive};
@@ -62,15 +61,11 @@ pub fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
     let mut feed = Partly { simulation: Simulation::new(scene).unwrap_or_else(|why| panic!("{why}")), dumb };
     let mut beats = Vec::new();
     let mut note = |dive: &headrace_monitor::run::Loop| {
-        for notice in dive.notices() {
-            if let Notice::Advice(entry) = notice {
-                beats.push(*entry);
-            }
-        }
+        beats.extend_from_slice(&dive.view().advised().entries);
     };
     drive(&mut dive, &mut feed, Pace { tick, ..Pace::default() }, &mut note).unwrap();
     dive.finish(&mut |_, _| {});
-    Advised { beats, report: Report::of(&dive), digest: dive.digest() }
+    Advised { beats, report: Report::of(&dive), digest: dive.view().digest() }
 }
 
 impl Advised {

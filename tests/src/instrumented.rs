@@ -1,17 +1,14 @@
 //! Dives whose placed pings are copied out of the loop, as input of coverage oracles.
 
-use bevy_ecs::prelude::{Res, ResMut, Resource};
 use headrace_geometry::frames::{Mount, Pose};
 use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::App;
-use headrace_monitor::messages::{Outcome, Placed, PlacedList};
+use headrace_monitor::messages::Outcome;
 use headrace_monitor::report::Report;
-use headrace_monitor::resources::{Digests, VehicleEntities};
 use headrace_monitor::result_stream::{RecordKind, first_record};
-use headrace_monitor::stage::Stage;
-use headrace_monitor::{Plugin, PluginError};
+use headrace_monitor::run::Loop;
 use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
 use headrace_sensor::reading::SourceId;
@@ -77,68 +74,58 @@ impl Dive {
     }
 }
 
-#[derive(Resource, Default)]
+#[derive(Default)]
 struct Seen {
     pings: Vec<Ping>,
     /// Place of every return. The loop may decide later whether a return is wall or doubtful.
     placed: Vec<Option<[f64; 3]>>,
+    /// Source of each ping.
+    sources: Vec<SourceId>,
 }
 
-/// Observer that copies the placed pings and changes nothing.
-struct Watch;
-
-impl Plugin for Watch {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.insert_resource(Seen::default());
-        let mut digests = Digests::default();
-        digests.keep();
-        app.insert_resource(digests);
-        app.add_systems(Stage::Judge, watch);
-        Ok(())
-    }
-}
-
-#[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
-fn watch(
-    placed: Res<'_, PlacedList>,
-    digests: Res<'_, Digests>,
-    entities: Res<'_, VehicleEntities>,
-    mut seen: ResMut<'_, Seen>,
-) {
-    for item in &placed.0 {
-        let Placed::Ping(ping) = item else { continue };
-        seen.placed.push(match ping.outcome {
-            Outcome::Sample { point, .. } => Some([point.x(), point.y(), point.z()]),
-            Outcome::Lost(..) | Outcome::Unplaced(_) => None,
-        });
-        seen.pings.push(Ping {
-            head: ping.head,
-            received: ping.received,
-            new_sweep: ping.new_sweep,
-            single_step: ping.single_step,
-            pose: ping.fix.map(|fix| fix.pose),
-            sample: None,
-            doubtful: None,
-        });
-    }
-    let mut words = digests.pings.words();
-    while let Some((record, rest)) = first_record(words) {
-        words = rest;
-        let is_wall = record.kind == Some(RecordKind::Sample);
-        if !is_wall && record.kind != Some(RecordKind::Doubtful) {
-            continue;
+impl Seen {
+    /// Copies the pings of the loop's last tick, and the returns classified in it.
+    fn note(&mut self, dive: &Loop) {
+        for ping in dive.view().placed().pings() {
+            self.placed.push(match ping.outcome {
+                Outcome::Sample { point, .. } => Some([point.x(), point.y(), point.z()]),
+                Outcome::Lost(..) | Outcome::Unplaced(_) => None,
+            });
+            self.sources.push(ping.source);
+            self.pings.push(Ping {
+                head: ping.head,
+                received: ping.received,
+                new_sweep: ping.new_sweep,
+                single_step: ping.single_step,
+                pose: ping.fix.map(|fix| fix.pose),
+                sample: None,
+                doubtful: None,
+            });
         }
-        let [received, source, _, place @ ..] = record.words else { panic!("a ping's words") };
+        let mut words = dive.view().surveyor().digests().pings.words();
+        while let Some((record, rest)) = first_record(words) {
+            words = rest;
+            let is_wall = record.kind == Some(RecordKind::Sample);
+            if is_wall || record.kind == Some(RecordKind::Doubtful) {
+                self.note_return(record.words, is_wall);
+            }
+        }
+    }
+
+    /// Adds a classified return to its ping.
+    fn note_return(&mut self, words: &[u64], is_wall: bool) {
+        let [received, source, _, place @ ..] = words else { panic!("a ping's words") };
         let [x_m, y_m, z_m, arc_m] = [0, 1, 2, 3].map(|k| f64::from_bits(place[k]));
         let point = [x_m, y_m, z_m];
-        let sample = Some(Sample { place: [x_m, arc_m], point });
-        let head = entities.of_source(SourceId(u16::try_from(*source).unwrap()));
-        let Seen { pings, placed } = &mut *seen;
-        let of_it = |(ping, placed): &(&mut Ping, &Option<[f64; 3]>)| {
-            entities.of_head(ping.head) == head && ping.received.0 == *received && **placed == Some(point)
+        let source = SourceId(u16::try_from(*source).unwrap());
+        let is_it = |k: &usize| {
+            let (ping, placed) = (&self.pings[*k], self.placed[*k]);
+            self.sources[*k] == source && ping.received.0 == *received && placed == Some(point)
         };
-        let (ping, _) = pings.iter_mut().zip(&*placed).rev().find(of_it).unwrap();
-        *(if is_wall { &mut ping.sample } else { &mut ping.doubtful }) = sample;
+        let ping = (0..self.pings.len()).rev().find(is_it).unwrap();
+        let ping = &mut self.pings[ping];
+        *(if is_wall { &mut ping.sample } else { &mut ping.doubtful }) =
+            Some(Sample { place: [x_m, arc_m], point });
     }
 }
 
@@ -177,14 +164,15 @@ fn watched(scene: &Scene, vehicle: &VehicleConfig, mission: Mission, pace: Pace)
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref()).unwrap();
     }
-    app.add_plugin(&Watch).unwrap();
+    app.keep_results();
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
-    drive(&mut dive, &mut SimulationFeed::new(simulation), pace, &mut |_| {}).unwrap();
+    let mut seen = Seen::default();
+    drive(&mut dive, &mut SimulationFeed::new(simulation), pace, &mut |dive| seen.note(dive)).unwrap();
     dive.finish(&mut |_, _| {});
     let heads = vehicle.heads();
     Dive {
-        pings: dive.resource::<Seen>().unwrap().pings.clone(),
+        pings: seen.pings,
         report: Report::of(&dive),
         profile: dive.mission().profile.clone(),
         ranges_m: heads.iter().map(|head| head.reach_m(vehicle.site.sound_speed_mps)[1]).collect(),

@@ -181,11 +181,11 @@ impl Outing {
         let to_m = from_m + self.judged_m();
         let mut beats = Vec::new();
         let judged = truth::dive_noting(&scene, &scene.vehicle, &mut |dive| {
-            for notice in dive.notices() {
+            for notice in dive.view().notices() {
                 if let Notice::Advice(entry) = notice
                     && entry.chainage_m.is_some_and(|x_m| x_m >= from_m && x_m <= to_m)
                 {
-                    beats.push(*entry);
+                    beats.push(entry);
                 }
             }
         });

@@ -209,7 +209,7 @@ impl Rig {
         view.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
         drop(devices);
         dive.finish(&mut |_, _| ());
-        let (report, digest) = (Report::of(&dive), dive.digest());
+        let (report, digest) = (Report::of(&dive), dive.view().digest());
         drop(dive);
         if let Some((log, handle, text)) = recorded {
             handle.finish().unwrap();
@@ -323,5 +323,5 @@ fn replayed(log: &Path, text: &str, dropped: u64) -> u64 {
     drive(&mut dive, &mut player, Pace::default(), &mut |_| ()).unwrap();
     assert_eq!(drops::apart(&player.losses()), (dropped, Vec::new()));
     dive.finish(&mut |_, _| ());
-    dive.digest()
+    dive.view().digest()
 }

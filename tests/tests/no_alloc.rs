@@ -22,7 +22,7 @@ use headrace_mavlink::MavHeader;
 use headrace_mavlink::decoder::{self as mavlink, MavlinkDecoder, Part};
 use headrace_mavlink::message::{Imu, ImuMessage, Message};
 use headrace_monitor::App;
-use headrace_monitor::outlet::NoticeOutlet;
+use headrace_monitor::notice_outlet::NoticeOutlet;
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 use headrace_sensor::device::{Decoder, Direction};
@@ -160,8 +160,8 @@ fn million_packets_need_no_allocation() {
         assert!(simulation.peek_message().is_some(), "the scene is too short: {packets} packets");
     }
     assert_eq!(allocated, 0, "allocator calls in {packets} packets");
-    let (list, counts) = (dive.alert_list(), dive.console_counts());
-    assert!(list.raised() > 5 && dive.notes().iter().count() > 5, "{} alerts", list.raised());
+    let (list, counts) = (dive.view().alert_list(), dive.view().console_counts());
+    assert!(list.raised() > 5 && dive.view().notes().iter().count() > 5, "{} alerts", list.raised());
     assert!(list.iter().any(|alert| alert.acknowledged.is_some()) && counts.invalid > 5, "{counts:?}");
     assert!(notices.dropped() > 0, "the notice queue has overflowed");
     assert!(steps.dropped() > 0, "the journal has overflowed");

@@ -1,52 +1,21 @@
 //! Builder of the loop: sources, sensors and plugins.
 
-use bevy_ecs::component::Mutable;
 use bevy_ecs::entity::Entity;
-use bevy_ecs::prelude::Resource;
-use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
-use bevy_ecs::system::ScheduleSystem;
-use bevy_ecs::world::World;
 
 use super::entities::{HeadSpecification, Mounted, SensorDecoder, SensorHealth};
 use super::error::PluginError;
-use super::loop_snapshot::StateParts;
-use super::resources::Digests;
+use super::outlet::Outlet;
+use super::part::Part;
 use super::ring::{self, Port, PortReader};
-use super::stage::{self, Stage};
-use super::stages;
-use headrace_geometry::snapshot::Stateful;
-use headrace_sensor::device::{Decoder, Device, SensorInfo, SensorSpec};
+use super::source::{SourceInfo, SourceSpec};
+use super::stage::{AdviseStage, PlaceStage, SurveyStage};
+use headrace_sensor::device::{Device, SensorInfo, SensorSpec};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_vehicle::{CONSOLE_ID, Mission};
 
-/// A source of bytes, as a plugin registers it.
-pub struct SourceSpec {
-    /// Name of the source, and of its channel in the log.
-    pub id: String,
-    /// Kind of device.
-    pub plugin: String,
-    /// Connection as written in the vehicle file.
-    pub connect: String,
-    /// Decoder from bytes to readings.
-    pub decoder: Box<dyn Decoder>,
-    /// Capacity of the source's ring, bytes.
-    pub ring_bytes: usize,
-}
-
-/// A source without its decoder, as listed in reports and logs.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SourceInfo {
-    /// Name.
-    pub id: String,
-    /// Kind of device.
-    pub plugin: String,
-    /// Connection.
-    pub connect: String,
-}
-
-/// An addition to the loop, such as an outlet or a stage.
+/// An addition to the loop, such as an outlet or a system.
 pub trait Plugin {
-    /// Registers sources, components, systems in a named stage, and outlets.
+    /// Registers sources, outlets, and resources and systems of a world.
     ///
     /// Errors: a requirement of the plugin is missing or duplicated.
     fn build(&self, app: &mut App) -> Result<(), PluginError>;
@@ -55,33 +24,35 @@ pub trait Plugin {
 /// Builder of the loop. [`App::arm`] makes it ready to run.
 pub struct App {
     pub(super) mission: Mission,
-    pub(super) world: World,
-    pub(super) schedule: Schedule,
+    /// World that converts packets to placed pings.
+    pub placer: Part<PlaceStage>,
+    /// World that converts placed pings to verdicts.
+    pub surveyor: Part<SurveyStage>,
+    /// World that computes the speed advice.
+    pub adviser: Part<AdviseStage>,
+    pub(super) outlets: Vec<Box<dyn Outlet>>,
+    pub(super) keeps_results: bool,
     pub(super) sources: Vec<SourceInfo>,
-    /// Entity of each source.
+    /// Entity of each source in the placer.
     pub(super) entities: Vec<Entity>,
     pub(super) ports: Vec<Port>,
     pub(super) readers: Vec<PortReader>,
-    /// Whether a plugin has systems in the stages that georeference pings.
-    pub(super) has_own_placing: bool,
 }
 
 impl App {
     /// Creates a loop without sources.
     pub fn new(mission: Mission) -> Self {
-        let mut schedule = stage::schedule();
-        stages::add(&mut schedule);
-        let mut world = World::new();
-        world.insert_resource(StateParts::of_the_loop());
         Self {
             mission,
-            world,
-            schedule,
+            placer: Part::new(),
+            surveyor: Part::new(),
+            adviser: Part::new(),
+            outlets: Vec::new(),
+            keeps_results: false,
             sources: Vec::new(),
             entities: Vec::new(),
             ports: Vec::new(),
             readers: Vec::new(),
-            has_own_placing: false,
         }
     }
 
@@ -110,7 +81,7 @@ impl App {
         self.ports.push(port);
         self.readers.push(reader);
         let source = SourceId(id);
-        let entity = self.world.spawn((
+        let entity = self.placer.world.spawn((
             Mounted { source, info: SensorInfo::other() },
             SensorDecoder(spec.decoder),
             SensorHealth::default(),
@@ -132,7 +103,7 @@ impl App {
             ring_bytes,
         })?;
         let Some(entity) = self.entities.get(source.index()) else { return Ok(source) };
-        let mut entity = self.world.entity_mut(*entity);
+        let mut entity = self.placer.world.entity_mut(*entity);
         entity.insert(Mounted { source, info: SensorInfo { mount: sensor.mount, kind } });
         if let Some(spec) = device.head() {
             entity.insert(HeadSpecification::of(device, spec, &self.mission));
@@ -140,45 +111,14 @@ impl App {
         Ok(source)
     }
 
-    /// Adds a resource for a plugin's own systems.
-    pub fn insert_resource(&mut self, resource: impl Resource) {
-        self.world.insert_resource(resource);
-    }
-
-    /// Adds a resource that affects results. Snapshots store it as a part with this name.
-    pub fn insert_state(
-        &mut self,
-        name: &'static str,
-        resource: impl Resource<Mutability = Mutable> + Stateful,
-    ) {
-        self.world.resource_mut::<StateParts>().add_of(name, &resource);
-        self.world.insert_resource(resource);
+    /// Adds an outlet, which gets the results of every tick.
+    pub fn add_outlet(&mut self, outlet: impl Outlet + 'static) {
+        self.outlets.push(Box::new(outlet));
     }
 
     /// Keeps the contents of the result streams of every tick, for recording or comparison.
     pub fn keep_results(&mut self) {
-        let mut digests = Digests::default();
-        digests.keep();
-        self.world.insert_resource(digests);
-    }
-
-    /// Adds systems to a stage. The caller must order systems of one stage that share data.
-    pub fn add_systems<M>(&mut self, stage: Stage, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
-        self.has_own_placing |= stage.is_placing();
-        self.schedule.add_systems(systems.in_set(stage));
-    }
-
-    /// Adds systems between a stage and the next, such as measurements of the finished stage.
-    pub fn add_systems_after<M>(
-        &mut self,
-        stage: Stage,
-        systems: impl IntoScheduleConfigs<ScheduleSystem, M>,
-    ) {
-        self.has_own_placing |= stage.is_placing();
-        match stage.next() {
-            Some(next) => self.schedule.add_systems(systems.after(stage).before(next)),
-            None => self.schedule.add_systems(systems.after(stage)),
-        };
+        self.keeps_results = true;
     }
 
     /// Sources so far, in the order of their ids.

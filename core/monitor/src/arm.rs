@@ -4,31 +4,31 @@ use bevy_ecs::entity::Entity;
 use bevy_ecs::query::With;
 use bevy_ecs::world::World;
 
-use super::advice_log::AdviceLog;
-use super::alert_list::{AlertList, MOST_LISTED};
-use super::alerts::Alerts;
-use super::app::{App, SourceInfo};
-use super::console::{Commands, Console};
+use super::adviser::{Adviser, Advisor};
+use super::alert_list::AlertList;
+use super::alerter::Alerter;
+use super::app::App;
+use super::console::Console;
 use super::entities::{
-    Head, HeadFrontier, HeadSpecification, HeadSweep, HiddenAngles, LossCount, MeasuredMotion, Mounted,
-    Navigator, VehicleState,
+    Head, HeadClassifier, HeadEntities, HeadFrontier, HeadSpecification, HeadSweep, HiddenAngles, LossCount,
+    MeasuredMotion, Mounted, Navigator, VehicleEntities, VehicleState,
 };
 use super::error::PluginError;
 use super::head_descriptions::HeadDescriptions;
 use super::live_state::{LiveState, source_bits};
-use super::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
-use super::messages::{
-    AdviceList, Events, JudgedStates, Notices, PlacedEvents, PlacedList, PositionedList, Requests,
-};
-use super::notes::Notes;
 use super::other_settings;
-
-use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, TunnelDesign, VehicleEntities};
+use super::part::Part;
+use super::placer::Placer;
+use super::placer::sound_speed::SoundSpeed;
+use super::resources::{Coverage, Finder, Target, TunnelDesign};
 use super::ring;
-use super::run::Loop;
-use super::stages::{Advisor, Driving, RunInputs, SoundSpeed};
+use super::run::{Loop, Parts};
+use super::source::SourceInfo;
+use super::stage::{PlaceStage, SurveyStage};
+use super::surveyor::Surveyor;
+use super::view::About;
 use headrace_coverage::{
-    Frontier, GridLayout, HoleFinder, MissingSamples, Relief, SampleStore, Sections, Soundings, StoreLayout,
+    Frontier, GridLayout, HoleFinder, MissingSamples, SampleStore, Sections, Soundings, StoreLayout,
     WallLimits,
 };
 use headrace_fusion::Navigation;
@@ -39,9 +39,6 @@ use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_vehicle::Mission;
 
-/// Capacity for the readings of one tick. The shortest frame of any device has over ten bytes.
-const MAX_TICK_READINGS: usize = MAX_TICK_BYTES / 8;
-
 /// Margin of the sample store beyond both ends of the tunnel, m. It covers heads mounted ahead of or behind
 /// the vehicle's origin.
 const ROOM_BEYOND_M: f64 = 25.0;
@@ -50,146 +47,124 @@ const SAMPLES_PER_M: f64 = 4_000.0;
 const MIN_SAMPLES: f64 = 4_000_000.0;
 const MAX_SAMPLES: f64 = 40_000_000.0;
 
-/// Maximum number of runs that change when one section is judged: its own run and two others.
-const RUNS_EACH: usize = 3;
-/// Notices per judged section: one for the section, three per run and its alert, and one for an alert.
-const NOTICES_EACH: usize = 2 + 3 * RUNS_EACH;
-/// Additional notices of alerts per tick.
-const NOTICES_OF_ALERTS: usize = 4 * MOST_LISTED;
-
 impl App {
     /// Allocates all memory of the loop and makes it ready to run. No tick allocates or locks afterwards.
     ///
     /// Errors: too many heads, a missing source, an invalid opening, or an ambiguous order of systems.
-    pub fn arm(mut self, navigation: Box<dyn Navigation>) -> Result<Loop, PluginError> {
-        let mission = &self.mission;
-        let specs = number_heads(&mut self.world, &self.entities)?;
-        let task = Task {
-            target_m: mission.target_m,
-            confidence_sd: mission.coverage.confidence_sd,
-            length_m: mission.length_m,
-            layout: mission.layout,
-            sound_speed_mps: mission.site.sound_speed_mps,
-            looks: mission.looks,
-        };
-        let advisor = advice::Advisor::new(&mission.profile, task, &specs, &mission.hull);
-        self.add_console();
-        let entities = self.spawn_entities(navigation, &advisor);
-        self.insert_resources(entities, advisor)?;
-        self.insert_messages();
-        self.schedule
-            .initialize(&mut self.world)
-            .map_err(|error| PluginError::Schedule { why: format!("{error:?}") })?;
-        Ok(Loop::new(self))
+    pub fn arm(self, navigation: Box<dyn Navigation>) -> Result<Loop, PluginError> {
+        let Self { mission, mut placer, mut surveyor, adviser, outlets, keeps_results, .. } = self;
+        let (sources, entities) = (self.sources, self.entities);
+        let advisor = advisor(&mission, &number_heads(&mut placer.world, &entities)?);
+        let heads = spawn_vehicle(&mut placer, &entities, navigation, &advisor);
+        copy_heads(&placer.world, &heads, &mut surveyor);
+        let world = &mut placer.world;
+        let (tunnel, target, reach_m) =
+            (tunnel_design(&mission), target(world, &mission), heads_reach_m(world));
+        let descriptions = head_descriptions(world, &mission, &sources);
+        let head_sources = heads.iter().filter_map(|head| world.get::<Mounted>(*head));
+        let head_sources: Vec<SourceId> = head_sources.map(|mounted| mounted.source).collect();
+        let advisor = Advisor::new(advisor, mission.target_m, mission.dive_time);
+        let adviser = Adviser::new(adviser, advisor, keeps_results)?;
+        surveyor.insert_resource(tunnel.clone());
+        surveyor.insert_resource(target);
+        let coverage = coverage(&mission, reach_m)?;
+        let list = AlertList::new(mission.alerts, mission.limits, coverage.sections.len());
+        let finder = Finder(HoleFinder::new(mission.coverage.hole_tolerance_m));
+        let surveyor = Surveyor::new(surveyor, coverage, finder, keeps_results)?;
+        placer.insert_resource(tunnel);
+        placer.insert_resource(target);
+        let (console, console_reader) = ring::ring(0);
+        let ports = self.ports.into_iter().chain([console]).collect();
+        let readers = self.readers.into_iter().chain([console_reader]).collect();
+        let sound_speed = SoundSpeed::new(mission.site.sound_speed_mps, sound_source(&mission, &sources)?);
+        placer.insert_state("speed of sound", sound_speed);
+        let placer = Placer::new(placer, readers, keeps_results)?;
+        let live = live_state(&mission, &head_sources, sources.len(), reach_m);
+        let alerter = Alerter::new(list, live, head_sources, surveyor.found().runs.capacity(), keeps_results);
+        let about = About { mission, sources, descriptions };
+        Ok(Loop::new(about, Parts { placer, surveyor, adviser, alerter }, outlets, ports))
     }
+}
 
-    /// Adds the operator's input after all sensors.
-    fn add_console(&mut self) {
-        let (port, reader) = ring::ring(0);
-        self.ports.push(port);
-        self.readers.push(reader);
-        // The number is at most that of the sensors.
-        let number = u16::try_from(self.sources.len()).unwrap_or(u16::MAX);
-        self.world.insert_resource(Console::new(SourceId(number)));
-        self.world.insert_resource(Commands::new());
-        self.world.insert_resource(Notes::default());
-    }
+fn advisor(mission: &Mission, heads: &[(HeadSpec, Vec<HeadMode>)]) -> advice::Advisor {
+    let task = Task {
+        target_m: mission.target_m,
+        confidence_sd: mission.coverage.confidence_sd,
+        length_m: mission.length_m,
+        layout: mission.layout,
+        sound_speed_mps: mission.site.sound_speed_mps,
+        looks: mission.looks,
+    };
+    advice::Advisor::new(&mission.profile, task, heads, &mission.hull)
+}
 
-    /// Spawns the vehicle, and adds the heads' remaining components.
-    fn spawn_entities(
-        &mut self,
-        navigation: Box<dyn Navigation>,
-        advisor: &advice::Advisor,
-    ) -> VehicleEntities {
-        let world = &mut self.world;
-        let repeats = vec![StuckSensor::default(); MAX_SOURCES];
-        let navigator = Navigator { navigation, next_beat: None, repeats, hung: 0 };
-        let vehicle = world.spawn((navigator, VehicleState::default(), Driving::default())).id();
-        let mut hidden = advisor.hidden_angles();
-        let mut heads = Vec::new();
-        for entity in &self.entities {
-            if world.get::<Head>(*entity).is_none() {
-                continue;
-            }
+/// Spawns the vehicle in the placer, and adds the heads' remaining components. Returns the heads by number.
+fn spawn_vehicle(
+    placer: &mut Part<PlaceStage>,
+    sensors: &[Entity],
+    navigation: Box<dyn Navigation>,
+    advisor: &advice::Advisor,
+) -> Vec<Entity> {
+    let world = &mut placer.world;
+    let repeats = vec![StuckSensor::default(); MAX_SOURCES];
+    let navigator = Navigator { navigation, next_beat: None, repeats, hung: 0 };
+    let vehicle = world.spawn((navigator, VehicleState::default())).id();
+    let mut hidden = advisor.hidden_angles();
+    let mut heads = Vec::new();
+    for entity in sensors {
+        if world.get::<Head>(*entity).is_some() {
             let hidden = HiddenAngles(hidden.next().map(<[_]>::to_vec).unwrap_or_default());
-            let state = (
-                MeasuredMotion::default(),
-                LossCount::default(),
-                HeadSweep::default(),
-                HeadFrontier::default(),
-            );
+            let state = (MeasuredMotion::default(), LossCount::default());
             world.entity_mut(*entity).insert((hidden, state));
             heads.push(*entity);
         }
-        VehicleEntities { vehicle, by_source: self.entities.clone(), heads }
     }
+    placer.entities = core::iter::once(vehicle).chain(sensors.iter().copied()).collect();
+    // The last source is the operator's input, after all sensors.
+    let console = SourceId(u16::try_from(sensors.len()).unwrap_or(u16::MAX));
+    placer.insert_state("console", Console::new(console));
+    placer.insert_resource(VehicleEntities { vehicle, by_source: sensors.to_vec() });
+    heads
+}
 
-    fn insert_resources(
-        &mut self,
-        entities: VehicleEntities,
-        advisor: advice::Advisor,
-    ) -> Result<(), PluginError> {
-        let Self { mission, world, sources, .. } = self;
-        let source_of = |entity: &Entity| world.get::<Mounted>(*entity).map(|mounted| mounted.source);
-        let heads: Vec<SourceId> = entities.heads.iter().filter_map(source_of).collect();
-        world.insert_resource(entities);
-        let told_by = sound_source(mission, sources)?;
-        world.insert_resource(SoundSpeed::new(mission.site.sound_speed_mps, told_by));
-        world.insert_resource(Finder(HoleFinder::new(mission.coverage.hole_tolerance_m)));
-        world.insert_resource(Alerts::default());
-        world.insert_resource(Advisor::new(advisor, mission.target_m, mission.dive_time));
-        world.insert_resource(AdviceLog::default());
-        if world.get_resource::<Digests>().is_none() {
-            world.insert_resource(Digests::default());
-        }
-        world.insert_resource(Tally::default());
-        world.insert_resource(TickTime::default());
-        let reach_m = heads_reach_m(world);
-        let coverage = coverage(mission, reach_m)?;
-        world.insert_resource(AlertList::new(mission.alerts, mission.limits, coverage.sections.len()));
-        world.insert_resource(coverage);
-        world.insert_resource(TunnelDesign {
-            profile: mission.profile.clone(),
-            site: mission.site,
-            length_m: mission.length_m,
-            contradiction_m: mission.coverage.contradiction_m,
-            limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
-        });
-        let words = head_descriptions(world, mission, sources);
-        world.insert_resource(words);
-        let heads = source_bits(heads.into_iter(), HeadSet::from_bits(u8::MAX));
-        let sources = u16::try_from(sources.len()).unwrap_or(0);
-        let confidence_sd = mission.coverage.confidence_sd;
-        let live = LiveState::new(mission.target_m, confidence_sd, heads, sources);
-        let (length_m, heads_reach_m) = (mission.length_m, reach_m);
-        world.insert_resource(LiveState { length_m, heads_reach_m, ..live });
-        let other = other_settings::of_heads(world, &mission.profile, mission.target_m);
-        world.insert_resource(Target {
-            target_m: mission.target_m,
-            layout: mission.layout,
-            planned_speed_mps: mission.planned_speed_mps,
-            other,
-        });
-        Ok(())
+/// Spawns the heads in the surveyor, with the placer's constants.
+fn copy_heads(placer: &World, heads: &[Entity], surveyor: &mut Part<SurveyStage>) {
+    for head in heads {
+        let head = placer.entity(*head);
+        let (number, mounted) = (head.get::<Head>().copied(), head.get::<Mounted>().copied());
+        let (Some(number), Some(mounted)) = (number, mounted) else { continue };
+        let hidden = head.get::<HiddenAngles>().cloned().unwrap_or_default();
+        let state = (HeadClassifier::default(), HeadSweep::default(), HeadFrontier::default());
+        let copy = surveyor.world.spawn((number, mounted, hidden, state)).id();
+        surveyor.entities.push(copy);
     }
+    surveyor.insert_resource(HeadEntities(surveyor.entities.clone()));
+}
 
-    fn insert_messages(&mut self) {
-        let world = &mut self.world;
-        // A jump along the tunnel may make all sections due for judging at once.
-        let most = world.resource::<Coverage>().sections.len() + MAX_TICK_PACKETS;
-        world.insert_resource(Inbox::default());
-        world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
-        world.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
-        world.insert_resource(PlacedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
-        world.insert_resource(PlacedEvents(Vec::with_capacity(2 * MAX_TICK_READINGS)));
-        world.insert_resource(AdviceList(Vec::with_capacity(MAX_TICK_PACKETS)));
-        world.insert_resource(RunInputs(Vec::with_capacity(RUNS_EACH * most)));
-        world.insert_resource(JudgedStates(Vec::with_capacity(MAX_TICK_PACKETS)));
-        world.insert_resource(Requests(Vec::with_capacity(most)));
-        world.insert_resource(Notices(Vec::with_capacity(
-            NOTICES_EACH * most + MAX_TICK_PACKETS + NOTICES_OF_ALERTS,
-        )));
+fn tunnel_design(mission: &Mission) -> TunnelDesign {
+    TunnelDesign {
+        profile: mission.profile.clone(),
+        site: mission.site,
+        length_m: mission.length_m,
+        contradiction_m: mission.coverage.contradiction_m,
+        limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
     }
+}
+
+fn target(placer: &mut World, mission: &Mission) -> Target {
+    Target {
+        target_m: mission.target_m,
+        layout: mission.layout,
+        planned_speed_mps: mission.planned_speed_mps,
+        other: other_settings::of_heads(placer, &mission.profile, mission.target_m),
+    }
+}
+
+fn live_state(mission: &Mission, heads: &[SourceId], sources: usize, heads_reach_m: f64) -> LiveState {
+    let bits = source_bits(heads.iter().copied(), HeadSet::from_bits(u8::MAX));
+    let sources = u16::try_from(sources).unwrap_or(0);
+    let live = LiveState::new(mission.target_m, mission.coverage.confidence_sd, bits, sources);
+    LiveState { length_m: mission.length_m, heads_reach_m, ..live }
 }
 
 /// Numbers the heads in the order of sources. Returns each head's specification and modes.
@@ -268,6 +243,6 @@ fn coverage(mission: &Mission, heads_reach_m: f64) -> Result<Coverage, PluginErr
         to_m: mission.length_m,
         node_m: mission.coverage.node_m,
     });
-    let (frontier, relief, lacks) = (Frontier::default(), Relief::default(), MissingSamples::default());
-    Ok(Coverage { store, sections, frontier, soundings, relief, unsure: None, lacks })
+    let (frontier, lacks) = (Frontier::default(), MissingSamples::default());
+    Ok(Coverage { store, sections, frontier, soundings, unsure: None, lacks })
 }

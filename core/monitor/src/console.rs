@@ -110,7 +110,7 @@ impl ConsoleInput {
     /// time to the loop.
     pub fn take_in_live(&mut self, dive: &Loop, now: MonoNs) {
         self.take_in(now);
-        let Some((_, last)) = dive.tally().span else { return };
+        let Some((_, last)) = dive.view().span() else { return };
         let since = now.since(last.max(self.time_told));
         if since.0 >= TIME_EVERY.0 && self.port.has_room(MAX_COMMAND_BYTES) {
             self.time_told = now;

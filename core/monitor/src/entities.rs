@@ -1,10 +1,14 @@
 //! The dive's entities: the vehicle and its sensors, including the heads.
 //!
-//! The vehicle has [`Navigator`], [`VehicleState`] and its motion statistics. Every sensor has [`Mounted`],
+//! In the placer, the vehicle has [`Navigator`] and [`VehicleState`]. Every sensor has [`Mounted`],
 //! [`SensorDecoder`] and [`SensorHealth`]. A head also has [`Head`], [`HeadSpecification`],
-//! [`MeasuredMotion`], [`LossCount`], [`HeadSweep`], [`HeadFrontier`] and [`HiddenAngles`].
+//! [`HiddenAngles`], [`MeasuredMotion`] and [`LossCount`].
+//!
+//! In the surveyor, a head has [`Head`], [`Mounted`], [`HiddenAngles`], [`HeadClassifier`], [`HeadSweep`] and
+//! [`HeadFrontier`].
 
-use bevy_ecs::prelude::Component;
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::{Component, Resource};
 use serde::{Deserialize, Serialize};
 
 pub use super::head_motion::MeasuredMotion;
@@ -160,13 +164,15 @@ impl HiddenAngles {
     }
 }
 
+/// Classification of a head's returns.
+#[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
+pub struct HeadClassifier(pub(super) HeadWall);
+
 /// Sweep state of a head.
 #[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
 pub struct HeadSweep {
     /// Last valid sample in the present sweep.
     pub(super) last: Option<LastSample>,
-    /// Classification of the head's returns.
-    pub(super) wall: HeadWall,
     /// Returns that wait for the next ones before they are classified.
     pub(super) waiting: WaitingReturns,
 }
@@ -216,3 +222,28 @@ pub(super) struct LastSample {
 /// Reach of a head; `None` before its first ping with a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct HeadFrontier(pub Option<HeadReach>);
+
+/// Entities of the placer: the vehicle, and each sensor by source.
+#[derive(Debug, Clone, Resource)]
+pub struct VehicleEntities {
+    pub(super) vehicle: Entity,
+    pub(super) by_source: Vec<Entity>,
+}
+
+impl VehicleEntities {
+    /// Sensor whose bytes come from this source.
+    pub fn of_source(&self, source: SourceId) -> Option<Entity> {
+        self.by_source.get(source.index()).copied()
+    }
+}
+
+/// Entities of the surveyor: each head by number, from zero in the order of sources.
+#[derive(Debug, Clone, Resource)]
+pub struct HeadEntities(pub(super) Vec<Entity>);
+
+impl HeadEntities {
+    /// Head with this number.
+    pub fn of_head(&self, head: usize) -> Option<Entity> {
+        self.0.get(head).copied()
+    }
+}

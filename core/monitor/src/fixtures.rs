@@ -1,12 +1,15 @@
-//! A pipe, its coverage and its advice, for tests.
+//! A pipe, its coverage and its advice, and a loop, for tests.
 
+use crate::entities::Mounted;
 use crate::messages::{Hidden, Outcome, PlacedPing};
 use crate::resources::{Coverage, TunnelDesign};
+use crate::run::Loop;
+use crate::{App, SourceSpec};
 use headrace_coverage::{
-    Frontier, GridLayout, MissingSamples, Reach, Relief, SampleStore, Sections, Soundings, StoreLayout,
-    WallLimits,
+    Frontier, GridLayout, MissingSamples, Reach, SampleStore, Sections, Soundings, StoreLayout, WallLimits,
 };
 use headrace_fusion::Fix;
+use headrace_fusion::direct::DirectNavigation;
 use headrace_fusion::relative::Relative;
 use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Vec3};
 use headrace_geometry::math;
@@ -19,7 +22,11 @@ use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
 use headrace_sampling::swing::Swing;
-use headrace_sensor::reading::SourceId;
+use headrace_sensor::codec::CodecCounts;
+use headrace_sensor::device::{Decoder, SensorInfo, SensorKind};
+use headrace_sensor::reading::{Decoded, Packet, SourceId};
+use headrace_vehicle::Mission;
+use serde::{Deserialize, Serialize};
 
 /// A pipe of 3 m radius.
 pub(crate) fn pipe() -> Profile {
@@ -41,7 +48,6 @@ pub(crate) fn coverage() -> Coverage {
         sections: Sections::new(0.25, 0.5, from_m, to_m),
         frontier: Frontier::default(),
         soundings: Soundings::new(GridLayout { perimeter_m, from_m, to_m, node_m: 0.5 }),
-        relief: Relief::default(),
         unsure: None,
         lacks: MissingSamples::default(),
     }
@@ -123,4 +129,31 @@ pub(crate) fn pinged(x_m: f64, angle_rad: f64) -> PlacedPing {
         source: SourceId(0),
         origin: Some(pose(x_m).position),
     }
+}
+
+/// A decoder that never gives a reading.
+#[derive(Serialize, Deserialize)]
+struct Silent;
+
+impl Decoder for Silent {
+    fn decode(&mut self, _: Packet<'_>, _: &mut dyn FnMut(Decoded)) {}
+
+    fn counts(&self) -> CodecCounts {
+        CodecCounts::default()
+    }
+}
+
+/// A loop with a head and a depth sensor in the pipe.
+pub(crate) fn armed() -> Loop {
+    let navigation = DirectNavigation::new(pipe(), Site::default());
+    let mut app = App::new(Mission::new(pipe(), 1.0));
+    for (id, kind) in [("head", SensorKind::Head), ("depth", SensorKind::Depth)] {
+        let (id, decoder) = (id.to_owned(), Box::new(Silent));
+        let spec = SourceSpec { id, plugin: String::new(), connect: String::new(), decoder, ring_bytes: 64 };
+        let source = app.add_source(spec).unwrap();
+        let sensor = app.entities[source.index()];
+        let info = SensorInfo { kind, ..SensorInfo::other() };
+        app.placer.world.entity_mut(sensor).insert(Mounted { source, info });
+    }
+    app.arm(Box::new(navigation)).unwrap()
 }

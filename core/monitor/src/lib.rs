@@ -1,5 +1,4 @@
-//! The loop: the state of a dive as entities and resources, the stages of a tick, and the messages to
-//! outlets.
+//! The loop: three worlds and the alerter, the values that they exchange in a tick, and the view for outlets.
 //!
 //! [`App`] is assembled from a vehicle's devices and from plugins. Arming turns it into a [`run::Loop`],
 //! which converts packets to positions, samples, verdicts and advice. It has no I/O, no thread and no clock:
@@ -26,7 +25,9 @@
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
 pub mod advice_log;
+pub mod adviser;
 pub mod alert_list;
+pub mod alerter;
 pub mod alerts;
 mod app;
 mod arm;
@@ -44,25 +45,29 @@ mod head_motion;
 pub mod live_messages;
 pub mod live_state;
 pub mod live_text;
-mod loop_snapshot;
 mod loss_count;
 pub mod merge;
 pub mod messages;
 pub mod notes;
+pub mod notice_outlet;
 mod other_settings;
 pub mod other_targets;
 pub mod outlet;
+pub mod part;
 pub mod pilot_text;
+pub mod placer;
 pub mod report;
 pub mod resources;
 pub mod result_stream;
 pub mod ring;
 pub mod run;
-pub mod split;
+pub mod source;
 pub mod stage;
-mod stages;
+pub mod surveyor;
 pub mod unsure_stretch;
+pub mod view;
 pub mod voice;
 
-pub use app::{App, Plugin, SourceInfo, SourceSpec};
+pub use app::{App, Plugin};
 pub use error::PluginError;
+pub use source::{SourceInfo, SourceSpec};

@@ -143,18 +143,18 @@ impl LiveMessages {
         match notice {
             Notice::Advice(_) => {}
             Notice::Listed { change, at, alert } => {
-                let alert = Box::new(alert.json(&dive.surroundings(), *at));
+                let alert = Box::new(alert.json(&dive.view().surroundings(), *at));
                 tell(LiveMessage::AlertChange { change: *change, alert });
             }
             Notice::Note(note) => tell(LiveMessage::Note(note.into())),
             Notice::Section { section, .. } => {
-                let sections = &dive.coverage().sections;
+                let sections = &dive.view().coverage().sections;
                 self.close_run_at(*section, sections, tell);
                 self.note_unsure(*section, sections, tell);
             }
             Notice::Run { id, change, .. } => self.run(*id, *change, dive, tell),
             Notice::Alert(kind, source) => {
-                let Some(alert) = dive.alerts().get(*kind, *source) else { return };
+                let Some(alert) = dive.view().alerts().get(*kind, *source) else { return };
                 let name = |source: u16| {
                     dive.sources().get(usize::from(source)).map_or_else(String::new, |info| info.id.clone())
                 };
@@ -173,12 +173,12 @@ impl LiveMessages {
     /// Reports whatever the live state requires, after every tick.
     pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(at) = state.at else { return };
-        let sections = &dive.coverage().sections;
+        let sections = &dive.view().coverage().sections;
         // The interval begins at the first update, when there is nothing to report.
         let since = *self.way_told.get_or_insert(at);
         if at.since(since).0.abs() >= WAY_EVERY.0 && state.metres.way_m() > 0.0 {
             self.way_told = Some(at);
-            let range = sections.sections_of(dive.coverage().frontier.way());
+            let range = sections.sections_of(dive.view().coverage().frontier.way());
             let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
             tell(LiveMessage::Way { from_m, to_m, metres: state.metres });
         }
@@ -283,7 +283,7 @@ impl LiveMessages {
     }
 
     fn run(&mut self, id: RunId, change: RunChange, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
-        let sections = &dive.coverage().sections;
+        let sections = &dive.view().coverage().sections;
         let Some(run) = sections.runs().get(id) else { return };
         match change {
             // A part of a reported stretch is no new stretch.
@@ -342,7 +342,7 @@ impl LiveMessages {
     ///
     /// A pilot who follows only the earlier advice may miss that wall again.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
-        let sections = &dive.coverage().sections;
+        let sections = &dive.view().coverage().sections;
         let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };
         let lasts = |cause: &Cause| f64::from(run.count(*cause)) * sections.section_m() >= LASTS_M;
         let Some(cause) = Cause::ALL.into_iter().find(|cause| !told.has(*cause) && lasts(cause)) else {
@@ -377,7 +377,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
 
 /// Message for a run, beginning at one of its sections.
 fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> LiveMessage {
-    let sections = &dive.coverage().sections;
+    let sections = &dive.view().coverage().sections;
     let from_m = sections.bounds_m(section).0;
     let hole = sections.get(section).and_then(|section| section.hole).unwrap_or(run.worst.1);
     let missed = Missed {
@@ -386,7 +386,7 @@ fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) ->
         figures: evidence.into(),
         hole_arc_m: hole.arc_m,
         target_m: sections.target_m(),
-        v_max_mps: dive.live_state().v_max_mps().unwrap_or(0.0),
+        v_max_mps: dive.view().live_state().v_max_mps().unwrap_or(0.0),
     };
     LiveMessage::Flag { run: id.0, from_m, cause: evidence.cause, causes: evidence.causes, missed }
 }

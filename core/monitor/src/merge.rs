@@ -12,14 +12,12 @@ pub const MAX_TICK_PACKETS: usize = 4096;
 pub const MAX_TICK_BYTES: usize = 256 * 1024;
 
 /// Packets of this tick, in the order of consumption.
-#[derive(Debug, Resource)]
+#[derive(Debug, Default, Resource)]
 pub struct Inbox {
     packets: Vec<Received>,
     bytes: Vec<u8>,
     /// Header of the next packet in each source's ring.
     heads: Vec<Option<PacketHeader>>,
-    /// Number of bytes that the next tick may take. A lagging lossless outlet reduces it.
-    pub allowance_bytes: usize,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -30,42 +28,20 @@ struct Received {
     to: usize,
 }
 
-impl Default for Inbox {
-    fn default() -> Self {
+impl Inbox {
+    /// An inbox with room for any tick. Allocates: all memory of the lists.
+    pub(super) fn with_room() -> Self {
         Self {
             packets: Vec::with_capacity(MAX_TICK_PACKETS),
             bytes: Vec::with_capacity(MAX_TICK_BYTES),
             // One for each sensor, and one for the console.
             heads: Vec::with_capacity(MAX_SOURCES + 1),
-            allowance_bytes: MAX_TICK_BYTES,
         }
     }
-}
 
-impl Inbox {
-    /// An inbox whose lists grow as needed, for the threads of a replay.
-    pub(super) fn growing() -> Self {
-        Self { packets: Vec::new(), bytes: Vec::new(), heads: Vec::new(), allowance_bytes: MAX_TICK_BYTES }
-    }
-
-    /// Swaps the packets with those of another inbox.
-    pub(super) fn swap_packets(&mut self, other: &mut Self) {
-        core::mem::swap(&mut self.packets, &mut other.packets);
-        core::mem::swap(&mut self.bytes, &mut other.bytes);
-    }
-
-    /// Replaces the packets by those of another inbox.
-    ///
-    /// If they exceed the allowance, returns false, and the inbox is then empty.
-    pub(super) fn take_packets(&mut self, other: &Self) -> bool {
-        self.packets.clear();
-        self.bytes.clear();
-        let is_allowed = other.bytes.len() <= self.allowance_bytes;
-        if is_allowed {
-            self.packets.extend_from_slice(&other.packets);
-            self.bytes.extend_from_slice(&other.bytes);
-        }
-        is_allowed
+    /// Number of bytes of the packets.
+    pub(super) fn byte_len(&self) -> usize {
+        self.bytes.len()
     }
 
     /// Packets in order.
@@ -86,16 +62,16 @@ impl Inbox {
         self.packets.is_empty()
     }
 
-    /// Takes the waiting packets. They are sorted by recorded order, then receive time, source and sequence.
+    /// Takes the waiting packets, of at most `allowance_bytes`. They are sorted by recorded order, then receive time, source and sequence.
     ///
     /// Packets of one source stay in order of arrival, whatever their timestamps. Allocates: never.
-    pub(super) fn fill(&mut self, readers: &mut [PortReader]) {
+    pub(super) fn fill(&mut self, readers: &mut [PortReader], allowance_bytes: usize) {
         self.packets.clear();
         self.bytes.clear();
         self.heads.clear();
         // A ring is looked at again only when its first packet has been taken.
         self.heads.extend(readers.iter().map(PortReader::peek));
-        let limit = self.allowance_bytes.min(MAX_TICK_BYTES);
+        let limit = allowance_bytes.min(MAX_TICK_BYTES);
         while self.packets.len() < MAX_TICK_PACKETS {
             let Some((source, header)) = first(&self.heads) else { return };
             let from = self.bytes.len();
@@ -135,7 +111,7 @@ mod tests {
     }
 
     fn drain(inbox: &mut Inbox, readers: &mut [PortReader]) -> Vec<(u16, u64, Vec<u8>)> {
-        inbox.fill(readers);
+        inbox.fill(readers, MAX_TICK_BYTES);
         inbox.iter().map(|(s, p)| (s.0, p.received.0, p.bytes.to_vec())).collect()
     }
 
@@ -185,9 +161,9 @@ mod tests {
         for i in 0..10 {
             to[0].send(MonoNs(i), &[i as u8; 10]).unwrap();
         }
-        let mut inbox = Inbox { allowance_bytes: 35, ..Inbox::default() };
-        assert_eq!(drain(&mut inbox, &mut readers).len(), 3);
-        inbox.allowance_bytes = MAX_TICK_BYTES;
+        let mut inbox = Inbox::default();
+        inbox.fill(&mut readers, 35);
+        assert_eq!(inbox.len(), 3);
         assert_eq!(drain(&mut inbox, &mut readers).len(), 7);
     }
 }

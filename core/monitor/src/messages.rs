@@ -1,9 +1,8 @@
-//! Messages between the stages of a tick.
+//! Elements of the lists that stages and parts of the loop pass on within a tick.
 //!
-//! Earlier stages fill lists for the tick. Each stage processes them in order, without looking ahead. A
-//! result therefore depends only on the packets before it, wherever the stream was cut into ticks.
+//! Each list is processed in order, without looking ahead. A result therefore depends only on the packets
+//! before it, wherever the stream was cut into ticks.
 
-use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::advice_log::AdviceEntry;
@@ -11,14 +10,13 @@ use super::alert_list::{AlertChange, ListedAlert};
 use super::alerts::AlertKind;
 use super::live_state::{ActiveAlerts, LiveMetres};
 use super::notes::Note;
-use headrace_coverage::{Judgement, Loss, Reach, Request, RunChange, RunId, Stretch};
+use headrace_coverage::{Judgement, Loss, Reach, RunChange, RunId, Stretch};
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::MonoNs;
-use headrace_sampling::advice::Advice;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SourceId};
 
@@ -35,10 +33,6 @@ pub struct Event {
     pub reading: Reading,
 }
 
-/// Readings of this tick, in order.
-#[derive(Debug, Resource)]
-pub struct Events(pub Vec<Event>);
-
 /// Doubts that navigation reports at an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Doubts {
@@ -51,35 +45,6 @@ pub struct Doubts {
     /// Bitmask of the stuck sources. They repeat a reading, and count as silent.
     pub hung: u64,
 }
-
-/// An epoch with its fix: a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD), or a sonar ping.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Positioned {
-    /// The event with this index is a sonar ping. The fix is for the ping's time of validity.
-    Ping {
-        /// Index into [`Events`].
-        event: usize,
-        /// Fix at the ping, or the reason for which there is none.
-        fix: Result<Fix, NoFix>,
-    },
-    /// A multiple of the advice period has passed.
-    Beat {
-        /// Timestamp.
-        at: MonoNs,
-        /// Fix at the update, or the reason for which there is none.
-        fix: Result<Fix, NoFix>,
-        /// Doubts of navigation.
-        doubts: Doubts,
-        /// Standard deviations of the pose at the update.
-        sd: Option<PoseSd>,
-        /// Index into [`Events`] of the next event.
-        before: usize,
-    },
-}
-
-/// Pings and updates of this tick with their fixes, in order.
-#[derive(Debug, Resource)]
-pub struct PositionedList(pub Vec<Positioned>);
 
 /// Outcome of a ping.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -150,25 +115,39 @@ pub struct PlacedPing {
     pub origin: Option<Point3<Tunnel>>,
 }
 
-/// An output item of [`super::stage::Stage::Georeference`].
+/// Situation at an update, a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD).
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "the list is filled once and read once per tick")]
-pub enum Placed {
-    /// A ping.
-    Ping(PlacedPing),
-    /// The situation at an update, and the doubts of navigation.
-    Situation(MonoNs, Situation, Doubts),
+pub struct Update {
+    /// Time of the update.
+    pub at: MonoNs,
+    /// Vehicle and heads at that time.
+    pub situation: Situation,
+    /// Doubts of navigation.
+    pub doubts: Doubts,
+    /// Fix, or the reason for which there is none.
+    pub fix: Result<Fix, NoFix>,
+    /// Standard deviations of the pose.
+    pub sd: Option<PoseSd>,
 }
 
-/// Pings and situations of this tick, in order.
-#[derive(Debug, Resource)]
-pub struct PlacedList(pub Vec<Placed>);
+/// A ping or an update, placed in the tunnel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "the list is filled once and read once per tick")]
+pub enum Placement {
+    /// A ping.
+    Ping(PlacedPing),
+    /// An update.
+    Update(Update),
+}
 
-/// For each item of [`PlacedList`], an index into [`Events`].
-///
-/// It is the index of the ping, or of the event after the situation.
-#[derive(Debug, Resource)]
-pub struct PlacedEvents(pub Vec<usize>);
+/// A placement and its place among the tick's readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlacedItem {
+    /// Index of the ping's reading. For an update: index of the first reading after it.
+    pub event: usize,
+    /// The ping or update.
+    pub placement: Placement,
+}
 
 /// Judged metres and active alerts at an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,18 +163,6 @@ pub struct Standing {
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
 }
-
-/// Judged metres and alerts at each update of this tick, in order.
-#[derive(Debug, Resource)]
-pub struct JudgedStates(pub Vec<Standing>);
-
-/// Advice at each update of this tick, in order.
-#[derive(Debug, Resource)]
-pub struct AdviceList(pub Vec<Advice>);
-
-/// Sections to be judged after a ping, in order. The buffer is reused.
-#[derive(Debug, Resource)]
-pub struct Requests(pub Vec<Request>);
 
 /// A result for the outlets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -235,7 +202,3 @@ pub enum Notice {
     /// A note was added.
     Note(Note),
 }
-
-/// Results of this tick, in order.
-#[derive(Debug, Resource)]
-pub struct Notices(pub Vec<Notice>);

@@ -29,6 +29,6 @@ impl Loop {
     ///
     /// Only sections whose hole has been measured are included.
     pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {
-        self.coverage().sections.verdicts_at(target_m, &self.outlook()).collect()
+        self.view().coverage().sections.verdicts_at(target_m, &self.outlook()).collect()
     }
 }

@@ -1,21 +1,21 @@
 //! State of the dive that isn't tied to one sensor: tunnel, target, coverage of the wall, and counts.
 
-use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
 use headrace_coverage::{
-    Frontier, HoleFinder, MissingSamples, OtherSettings, Relief, SampleStore, Sections, Soundings, Stretch,
+    Frontier, HoleFinder, MissingSamples, OtherSettings, Reach, SampleStore, Sections, Soundings, Stretch,
     WallLimits,
 };
 use headrace_fusion::NoFix;
+use headrace_geometry::frames::{Mount, Pose, Vec3};
+use headrace_geometry::math;
 use headrace_geometry::site::Site;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::layout::HeadLayout;
-use headrace_sensor::reading::SourceId;
 
 /// The tunnel as designed, and the water in it.
 #[derive(Debug, Clone, Resource)]
@@ -32,6 +32,27 @@ pub struct TunnelDesign {
     pub limits: WallLimits,
 }
 
+impl TunnelDesign {
+    /// Chainages that a head reaches.
+    ///
+    /// The samples lie in the plane across the head's axis. If the head is tilted, this plane extends over some
+    /// chainage.
+    pub(crate) fn reach(&self, pose: &Pose, mount: &Mount) -> Reach {
+        let origin = pose.place(mount.position);
+        let axis = pose.attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
+        let across = math::hypot(axis.y(), axis.z());
+        let spread_m = if across > 0.0 {
+            let leaning = [axis.y() / across, axis.z() / across];
+            let across = across.min(0.99);
+            let slope = across / math::sqrt(1.0 - across * across);
+            slope * self.profile.farthest_along_m([origin.y(), origin.z()], leaning)
+        } else {
+            0.0
+        };
+        Reach { from_m: origin.x() - spread_m, to_m: origin.x() + spread_m }
+    }
+}
+
 /// Coverage target.
 #[derive(Debug, Clone, Copy, Resource)]
 pub struct Target {
@@ -45,31 +66,6 @@ pub struct Target {
     pub(super) other: OtherSettings,
 }
 
-/// Entities of the vehicle, of each sensor by source, and of each head by number.
-#[derive(Debug, Clone, Resource)]
-pub struct VehicleEntities {
-    pub(super) vehicle: Entity,
-    pub(super) by_source: Vec<Entity>,
-    pub(super) heads: Vec<Entity>,
-}
-
-impl VehicleEntities {
-    /// The vehicle, then its sensors in the order of sources.
-    pub(super) fn all(&self) -> impl Iterator<Item = Entity> + '_ {
-        core::iter::once(self.vehicle).chain(self.by_source.iter().copied())
-    }
-
-    /// Sensor whose bytes come from this source.
-    pub fn of_source(&self, source: SourceId) -> Option<Entity> {
-        self.by_source.get(source.index()).copied()
-    }
-
-    /// Head with this number, from zero in the order of sources.
-    pub fn of_head(&self, head: usize) -> Option<Entity> {
-        self.heads.get(head).copied()
-    }
-}
-
 /// Coverage of the wall: the samples, the verdicts, and the data from which the verdicts are formed.
 #[derive(Debug, Resource)]
 pub struct Coverage {
@@ -81,15 +77,13 @@ pub struct Coverage {
     pub frontier: Frontier,
     /// Samples by node of a square grid.
     pub soundings: Soundings,
-    /// Places near the vehicle at which the wall was found to deviate from the design.
-    pub relief: Relief,
     /// Last judged unsure stretch.
     pub unsure: Option<Stretch>,
     /// Latest missing samples.
     pub lacks: MissingSamples,
 }
 
-stateful!(Coverage { state: store, sections, frontier, soundings, relief, unsure, lacks; });
+stateful!(Coverage { state: store, sections, frontier, soundings, unsure, lacks; });
 
 /// Hole search, with its working memory.
 #[derive(Debug, Default, Resource)]
@@ -105,65 +99,27 @@ impl Stateful for Finder {
     }
 }
 
-/// Result streams. Their digests together give the digest of the dive.
+/// Result streams of the surveyor.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
-    /// Poses at the updates.
-    pub poses: ResultStream,
     /// Placed pings.
     pub pings: ResultStream,
     /// Judgements.
     pub judgements: ResultStream,
-    /// The advice.
-    pub advice: ResultStream,
-    /// Live states at the updates.
-    pub states: ResultStream,
-    /// Changes of alerts, and notes.
-    pub alerts: ResultStream,
 }
 
-stateful!(Digests { state: poses, pings, judgements, advice, states, alerts; });
+stateful!(Digests { state: pings, judgements; });
 
 impl Digests {
-    /// Streams by name, in log order.
-    pub fn streams(&self) -> [(&'static str, &ResultStream); 6] {
-        [
-            ("poses", &self.poses),
-            ("pings", &self.pings),
-            ("judgements", &self.judgements),
-            ("advice", &self.advice),
-            ("states", &self.states),
-            ("alerts", &self.alerts),
-        ]
-    }
-
-    /// Keeps the words of each tick from now on. Allocates: once, all memory for the words.
-    pub fn keep(&mut self) {
-        self.poses.keep();
-        self.pings.keep();
-        self.judgements.keep();
-        self.advice.keep();
-        self.states.keep();
-        self.alerts.keep();
-    }
-
     pub(super) fn next_tick(&mut self) {
-        self.poses.next_tick();
         self.pings.next_tick();
         self.judgements.next_tick();
-        self.advice.next_tick();
-        self.states.next_tick();
-        self.alerts.next_tick();
     }
 }
 
-/// Counts over the whole dive.
+/// Counts of pings over the whole dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
 pub struct Tally {
-    /// Packets consumed.
-    pub packets: u64,
-    /// First and last receive time.
-    pub span: Option<(MonoNs, MonoNs)>,
     /// Samples on the wall.
     pub samples: u64,
     /// Pings without a return although the wall was within range, or without a fix.
@@ -187,7 +143,7 @@ pub struct Tally {
 }
 
 /// The current tick.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Resource, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TickTime {
     /// Number from zero.
     pub index: u64,

@@ -319,6 +319,11 @@ impl ResultStream {
         self
     }
 
+    /// Reserves as much room as another stream has. Allocates.
+    pub(super) fn reserve_as(&mut self, other: &Self) {
+        self.words.reserve_exact(other.room);
+    }
+
     /// Copies the state of another stream, with the words of its last tick.
     pub(super) fn follow(&mut self, other: &Self) {
         (self.digest, self.records, self.lost) = (other.digest, other.records, other.lost);

@@ -1,31 +1,24 @@
-//! The armed loop.
+//! The armed loop: three worlds and the alerter, one after the other in each tick.
 
-use bevy_ecs::component::Component;
-use bevy_ecs::prelude::{ResMut, Resource};
-use bevy_ecs::schedule::Schedule;
-use bevy_ecs::system::SystemState;
-use bevy_ecs::world::World;
+use std::sync::Arc;
 
 use super::advice_log::AdviceLog;
-use super::alert_list::{AlertList, Telling, TextContext};
-use super::alerts::Alerts;
-use super::app::{App, SourceInfo};
-use super::console::{Console, ConsoleCounts};
-use super::digest::Digest;
-use super::entities::{HeadFrontier, Mounted, Navigator, SensorDecoder, SensorHealth, VehicleState};
+use super::adviser::{Advised, Adviser};
+use super::alerter::Alerter;
+use super::entities::{Mounted, SensorDecoder};
 use super::head_descriptions::HeadDescriptions;
-use super::live_state::LiveState;
-use super::live_state::json::LiveStateJson;
-use super::loop_snapshot;
-use super::merge::Inbox;
-use super::messages::{Event, Events, Notice, Notices};
-use super::notes::Notes;
-use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntities};
-use super::ring::{Port, PortReader};
-use super::stages::{Results, RunInputs, SoundSpeed, judge_one};
+use super::merge::MAX_TICK_BYTES;
+use super::messages::Notice;
+use super::outlet::Outlet;
+use super::placer::{Placed, Placer};
+use super::resources::TickTime;
+use super::ring::Port;
+use super::source::SourceInfo;
+use super::surveyor::Surveyor;
+use super::view::{About, DiveView};
 use headrace_coverage::{Outlook, Request};
 use headrace_fusion::filter::sources::Consistency;
-use headrace_fusion::{Fix, NoFix};
+use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::codec::CodecCounts;
@@ -37,40 +30,53 @@ use headrace_vehicle::Mission;
 /// next batch.
 const FINISHED_AT_ONCE: usize = 256;
 
-/// Data for judging at the end of a dive.
-type AtEnd<'w> = (
-    ResMut<'w, Coverage>,
-    ResMut<'w, Finder>,
-    ResMut<'w, Notices>,
-    ResMut<'w, Digests>,
-    ResMut<'w, Alerts>,
-    ResMut<'w, RunInputs>,
-    ResMut<'w, AlertList>,
-);
+/// The parts of a loop.
+pub(super) struct Parts {
+    pub(super) placer: Placer,
+    pub(super) surveyor: Surveyor,
+    pub(super) adviser: Adviser,
+    pub(super) alerter: Alerter,
+}
 
 /// A running loop. All of its memory is allocated; a tick takes no lock, makes no system call and formats no
 /// text.
 pub struct Loop {
-    pub(super) world: World,
-    schedule: Schedule,
-    readers: Vec<PortReader>,
+    about: About,
+    /// Placer and adviser; `None` while they run on other threads.
+    ahead: Option<(Placer, Adviser)>,
+    surveyor: Surveyor,
+    alerter: Alerter,
+    /// Values of the last tick.
+    placed: Arc<Placed>,
+    advised: Advised,
+    outlets: Vec<Box<dyn Outlet>>,
+    /// Number of bytes of packets that the next tick may consume. A lagging outlet reduces it.
+    allowance_bytes: usize,
     ports: Vec<Option<Port>>,
-    sources: Vec<SourceInfo>,
-    mission: Mission,
+    time: TickTime,
     ticks: u64,
     finished: bool,
-    /// Whether a plugin has systems in the stages that georeference pings.
-    pub(super) has_own_placing: bool,
 }
 
 impl Loop {
-    /// Creates the loop from an app whose world has everything that the stages need.
-    pub(super) fn new(app: App) -> Self {
-        let App { mission, world, schedule, sources, ports, readers, has_own_placing, .. } = app;
-        let ports = ports.into_iter().map(Some).collect();
-        let (ticks, finished) = (0, false);
-        let mut armed =
-            Self { world, schedule, readers, ports, sources, mission, ticks, finished, has_own_placing };
+    /// Creates the loop. Allocates: the memory of the values that pass between the parts.
+    pub(super) fn new(about: About, parts: Parts, outlets: Vec<Box<dyn Outlet>>, ports: Vec<Port>) -> Self {
+        let Parts { placer, surveyor, adviser, alerter } = parts;
+        let (placed, advised) = (placer.placed_with_room(), adviser.advised_with_room());
+        let mut armed = Self {
+            about,
+            ahead: Some((placer, adviser)),
+            surveyor,
+            alerter,
+            placed: Arc::new(placed),
+            advised,
+            outlets,
+            allowance_bytes: MAX_TICK_BYTES,
+            ports: ports.into_iter().map(Some).collect(),
+            time: TickTime::default(),
+            ticks: 0,
+            finished: false,
+        };
         // The first run of a schedule allocates memory. Without packets the run has no other effect.
         armed.tick(MonoNs(0));
         armed.ticks = 0;
@@ -81,31 +87,82 @@ impl Loop {
     ///
     /// `now` is the end of the tick's time. The loop only records it; no result depends on it.
     ///
-    /// Allocates: never.
+    /// Panics: if parts of the loop are split off. Allocates: never.
     pub fn tick(&mut self, now: MonoNs) -> usize {
-        if let Some(mut time) = self.world.get_resource_mut::<TickTime>() {
-            *time = TickTime { index: self.ticks, now };
-        }
-        // After the end of a dive, the judgements made there must not be cleared before they are published.
-        if !self.finished {
-            self.world.resource_mut::<Digests>().next_tick();
-        }
-        if let Some(mut inbox) = self.world.get_resource_mut::<Inbox>() {
-            inbox.fill(&mut self.readers);
-        }
-        self.run_stages();
-        self.world.get_resource::<Inbox>().map_or(0, Inbox::len)
+        let Self { ahead, placed, advised, allowance_bytes, .. } = self;
+        #[expect(clippy::expect_used, reason = "a caller's mistake, as documented")]
+        let (placer, adviser) = ahead.as_mut().expect("no part of the loop is split off");
+        placer.tick(*allowance_bytes, sole(placed, placer));
+        adviser.tick(placed, advised);
+        self.conclude(now);
+        self.placed.inbox.len()
     }
 
-    /// Runs the stages of a tick.
-    pub(super) fn run_stages(&mut self) {
-        self.schedule.run(&mut self.world);
+    /// Runs the parts of a tick that follow placer and adviser, and publishes the results.
+    fn conclude(&mut self, now: MonoNs) {
+        let Self { surveyor, alerter, placed, advised, .. } = self;
+        self.time = TickTime { index: self.ticks, now };
+        // After the end of a dive, the judgements made there must not be cleared before they are published.
+        if !self.finished {
+            surveyor.next_tick();
+            alerter.next_tick();
+        }
+        surveyor.tick(placed);
+        alerter.tick(placed, surveyor.found(), advised, now);
+        self.publish();
         self.ticks += 1;
     }
 
-    /// The world, and the readers of the rings. [`crate::split`] uses them.
-    pub(super) fn split_world(&mut self) -> (&mut World, &mut Vec<PortReader>) {
-        (&mut self.world, &mut self.readers)
+    fn publish(&mut self) {
+        let mut outlets = core::mem::take(&mut self.outlets);
+        let view = self.view();
+        let allowances = outlets.iter_mut().map(|outlet| outlet.publish(&view));
+        self.allowance_bytes = allowances.fold(MAX_TICK_BYTES, usize::min);
+        self.outlets = outlets;
+    }
+
+    /// The view of the last tick.
+    pub fn view(&self) -> DiveView<'_> {
+        let Self { about, time, placed, surveyor, advised, alerter, .. } = self;
+        DiveView { about, time: *time, placed, surveyor, advised, alerter }
+    }
+
+    /// Splits off placer and adviser for other threads, until [`Loop::join`] puts them back.
+    ///
+    /// Returns `None` if they are split off already. Meanwhile, [`Loop::tick_placed`] replaces
+    /// [`Loop::tick`], and the loop can't be saved. Functions that ask placer or adviser, such as
+    /// [`Loop::fix`] or [`Loop::advice_log`], panic.
+    pub fn split(&mut self) -> Option<(Placer, Adviser)> {
+        self.ahead.take()
+    }
+
+    /// Whether placer and adviser are split off.
+    pub fn is_split(&self) -> bool {
+        self.ahead.is_none()
+    }
+
+    /// Puts placer and adviser back into the loop, after the last tick that they have processed.
+    pub fn join(&mut self, placer: Placer, adviser: Adviser) {
+        (self.placed, self.advised) = (Arc::new(placer.placed_with_room()), adviser.advised_with_room());
+        self.ahead = Some((placer, adviser));
+    }
+
+    /// Runs the rest of a tick from the values of placer and adviser. The advice is swapped with that of the
+    /// previous tick.
+    ///
+    /// Returns false if a lagging outlet holds back the tick's packets. The call then counts as a tick
+    /// without packets. Pass the same tick again a little later.
+    pub fn tick_placed(&mut self, now: MonoNs, placed: &Arc<Placed>, advised: &mut Advised) -> bool {
+        let is_taken = placed.inbox.byte_len() <= self.allowance_bytes;
+        if is_taken {
+            self.placed = Arc::clone(placed);
+            core::mem::swap(&mut self.advised, advised);
+        } else {
+            self.placed = Arc::new(self.placed.followed_by_nothing());
+            self.advised = self.advised.followed_by_nothing();
+        }
+        self.conclude(now);
+        is_taken
     }
 
     /// Takes the writing end of a source's ring, for a port's thread, a player or a simulator.
@@ -117,22 +174,22 @@ impl Loop {
 
     /// Takes the writing end of the operator's input. `None` if it was taken already.
     pub fn take_console(&mut self) -> Option<Port> {
-        self.take_port(self.sources.len())
+        self.take_port(self.about.sources.len())
     }
 
     /// Sources of the sensors, in the order of their ids. The operator's input is not among them.
     pub fn sources(&self) -> &[SourceInfo] {
-        &self.sources
+        &self.about.sources
     }
 
     /// Tunnel and target.
     pub fn mission(&self) -> &Mission {
-        &self.mission
+        &self.about.mission
     }
 
     /// Names of the heads and their alternative settings.
     pub fn head_descriptions(&self) -> &HeadDescriptions {
-        self.world.resource::<HeadDescriptions>()
+        &self.about.descriptions
     }
 
     /// Number of ticks run so far.
@@ -140,135 +197,64 @@ impl Loop {
         self.ticks
     }
 
+    /// Number and end of the last tick.
+    pub fn time(&self) -> TickTime {
+        self.time
+    }
+
     /// End of the last tick's time.
     pub fn now(&self) -> MonoNs {
-        self.world.resource::<TickTime>().now
+        self.time.now
     }
 
-    /// A plugin's own resource.
-    pub fn resource<T: Resource>(&self) -> Option<&T> {
-        self.world.get_resource::<T>()
-    }
-
-    /// Fix of the vehicle at the last update, and its standard deviations.
-    pub fn vehicle(&self) -> &VehicleState {
-        self.of_vehicle()
+    /// The placer, unless it is split off.
+    pub fn placer(&self) -> Option<&Placer> {
+        self.ahead.as_ref().map(|(placer, _)| placer)
     }
 
     /// Fix at `at`, which may be slightly before or after the last reading.
     ///
     /// Errors: the reason for which there is no fix.
     pub fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        self.of_vehicle::<Navigator>().navigation.fix(at)
+        self.navigation().fix(at)
     }
 
     /// Innovation statistics of a source; `None` if there are none.
     pub fn consistency(&self, source: usize) -> Option<Consistency> {
-        self.of_vehicle::<Navigator>().navigation.consistency(source)
+        self.navigation().consistency(source)
     }
 
-    /// Readings of the last tick, in order.
-    pub fn readings(&self) -> &[Event] {
-        &self.world.resource::<Events>().0
+    fn navigation(&self) -> &dyn Navigation {
+        self.ahead().0.navigation()
     }
 
-    /// Notices of the last tick, in order.
-    pub fn notices(&self) -> &[Notice] {
-        &self.world.resource::<Notices>().0
-    }
-
-    /// Coverage of the wall.
-    pub fn coverage(&self) -> &Coverage {
-        self.world.resource()
-    }
-
-    /// Counts of pings and packets over the whole dive.
-    pub fn tally(&self) -> &Tally {
-        self.world.resource()
-    }
-
-    /// Alerts about the dive as a whole.
-    pub fn alerts(&self) -> &Alerts {
-        self.world.resource()
-    }
-
-    /// Alerts with their life cycle.
-    pub fn alert_list(&self) -> &AlertList {
-        self.world.resource()
-    }
-
-    /// Notes of the dive.
-    pub fn notes(&self) -> &Notes {
-        self.world.resource()
-    }
-
-    /// Traffic of the operator's input.
-    pub fn console_counts(&self) -> ConsoleCounts {
-        self.world.resource::<Console>().counts
-    }
-
-    /// Context for the texts of the dive's alerts.
-    pub fn surroundings(&self) -> TextContext<'_> {
-        TextContext::of(
-            &self.sources,
-            &self.mission.profile,
-            &self.coverage().sections,
-            self.head_descriptions(),
-        )
-    }
-
-    /// Live state together with the alerts, as JSON.
-    pub fn live_state_json(&self) -> LiveStateJson {
-        self.live_state().json(&self.surroundings(), self.alert_list())
-    }
-
-    /// Live state as of the last update, published with the last tick.
-    pub fn live_state(&self) -> &LiveState {
-        self.world.resource()
+    fn ahead(&self) -> &(Placer, Adviser) {
+        #[expect(clippy::expect_used, reason = "a caller's mistake: see Loop::split")]
+        self.ahead.as_ref().expect("no part of the loop is split off")
     }
 
     /// Advice history.
     pub fn advice_log(&self) -> &AdviceLog {
-        self.world.resource()
-    }
-
-    /// The result streams with their digests.
-    pub fn digests(&self) -> &Digests {
-        self.world.resource()
+        self.ahead().1.log()
     }
 
     /// Minimum and maximum speed of sound used for ranges, m/s.
     pub fn sound_speeds_mps(&self) -> [f64; 2] {
-        self.world.resource::<SoundSpeed>().span_mps()
+        self.ahead().0.sound_speeds_mps()
     }
 
     /// Mount and kind of each sensor, in the order of sources.
     pub fn sensors(&self) -> Vec<SensorInfo> {
-        self.of_sensors::<Mounted>().map(|mounted| mounted.info).collect()
-    }
-
-    /// Traffic statistics of each sensor, in the order of sources.
-    pub fn health(&self) -> impl Iterator<Item = &SensorHealth> {
-        self.of_sensors()
-    }
-
-    /// A component of every sensor, in the order of sources.
-    fn of_sensors<T: Component>(&self) -> impl Iterator<Item = &T> + Clone {
-        let entities = self.world.resource::<VehicleEntities>();
-        entities.by_source.iter().filter_map(|entity| self.world.get(*entity))
-    }
-
-    /// A component of the vehicle, present since arming.
-    fn of_vehicle<T: Component>(&self) -> &T {
-        let vehicle = self.world.entity(self.world.resource::<VehicleEntities>().vehicle);
-        #[expect(clippy::expect_used, reason = "arming adds it, and nothing removes it")]
-        vehicle.get().expect("the vehicle's components exist since arming")
+        self.ahead().0.of_sensors::<Mounted>().map(|mounted| mounted.info).collect()
     }
 
     /// Outlook as of the last packet: where samples have landed and where they may still land.
     pub(super) fn outlook(&self) -> Outlook {
-        let at = self.tally().span.map_or(MonoNs(0), |(_, last)| last);
-        self.coverage().frontier.outlook(self.of_sensors().filter_map(|reach: &HeadFrontier| reach.0), at)
+        self.surveyor.outlook(self.last_packet())
+    }
+
+    fn last_packet(&self) -> MonoNs {
+        self.placed.span().map_or(MonoNs(0), |(_, last)| last)
     }
 
     /// Judges the sections whose verdict may still change, at the end of a dive, when no more samples will
@@ -277,59 +263,28 @@ impl Loop {
     /// `hear` gets the notices in batches, with the loop's state after each batch. All notices of a long dive
     /// at once would take more memory than its samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
-        let vehicle = self.world.resource::<VehicleEntities>().vehicle;
-        if let Some(mut navigator) = self.world.get_mut::<Navigator>(vehicle) {
-            navigator.navigation.end();
+        if let Some((placer, _)) = &mut self.ahead {
+            placer.end();
         }
-        self.world.resource_mut::<Digests>().next_tick();
+        self.placed = Arc::new(self.placed.followed_by_nothing());
+        self.advised = self.advised.followed_by_nothing();
+        self.surveyor.next_tick();
+        self.alerter.next_tick();
         self.finished = true;
-        super::stages::end_returns(&mut self.world);
-        let (open, common) = self.open_requests();
+        self.surveyor.end_returns();
+        let (open, common) = self.surveyor.open_requests(self.last_packet());
         let request = |section: &i64| Some(Request { section: *section, ..common? });
         for some in open.chunks(FINISHED_AT_ONCE) {
-            self.judge_all(some.iter().filter_map(request));
-            let notices = core::mem::take(&mut self.world.resource_mut::<Notices>().0);
+            let mut notices = Vec::new();
+            for request in some.iter().filter_map(request) {
+                self.surveyor.judge_at_end(request);
+                self.alerter.take_runs_at_end(&self.surveyor.found().runs);
+                notices.extend_from_slice(&self.surveyor.found().notices);
+                notices.extend_from_slice(&self.alerter.notices);
+            }
             for notice in &notices {
                 hear(notice, self);
             }
-            self.world.resource_mut::<Notices>().0 = notices;
-        }
-    }
-
-    /// Sections to be judged at the end of a dive, and the fields common to all requests for them.
-    fn open_requests(&mut self) -> (Vec<i64>, Option<Request>) {
-        let outlook = self.outlook();
-        let (mut open, mut common) = (Vec::new(), None);
-        let mut ask = |request: Request| {
-            open.push(request.section);
-            common = Some(request);
-        };
-        self.world.resource_mut::<Coverage>().sections.unsettled(&outlook, &mut ask);
-        (open, common)
-    }
-
-    fn judge_all(&mut self, requests: impl Iterator<Item = Request>) {
-        let Self { world, mission, .. } = self;
-        let mut parts = SystemState::<AtEnd<'_>>::new(world);
-        let Ok((mut coverage, mut finder, mut notices, mut digests, mut alerts, mut runs, mut list)) =
-            parts.get_mut(world)
-        else {
-            return;
-        };
-        notices.0.clear();
-        for request in requests {
-            runs.0.clear();
-            let mut results = Results {
-                finder: &mut finder,
-                notices: &mut notices,
-                digests: &mut digests,
-                alerts: &mut alerts,
-                runs: &mut runs,
-                place: (0, false),
-            };
-            judge_one(&request, &mission.profile, &mut coverage, &mut results);
-            let mut to = Telling { notices: &mut notices, stream: &mut digests.alerts };
-            runs.0.iter().for_each(|run| list.take_run(run, &mut to));
         }
     }
 
@@ -338,17 +293,20 @@ impl Loop {
     /// A loop of the same vehicle gives the same results after it has restored the snapshot. The snapshot
     /// excludes packets waiting in the rings, and private state of plugins.
     ///
-    /// Errors: a part can't be serialised.
+    /// Errors: a part is split off or can't be serialised.
     pub fn save(&self) -> Result<Vec<u8>, SnapshotError> {
-        if self.is_split() {
+        let Some((placer, adviser)) = &self.ahead else {
             let (part, why) =
                 ("the loop".to_owned(), "parts of it are on other threads; join first".to_owned());
             return Err(SnapshotError::Unsaved { part, why });
-        }
+        };
         let mut to = Saver::default();
         to.part("ticks");
-        to.value(&self.ticks);
-        loop_snapshot::save(&self.world, &mut to);
+        to.value(&(self.ticks, self.time));
+        placer.save(&mut to);
+        self.surveyor.save(&mut to);
+        adviser.save(&mut to);
+        self.alerter.save(&mut to);
         to.finish()
     }
 
@@ -359,48 +317,51 @@ impl Loop {
     /// Errors: the snapshot doesn't fit this loop. The loop must not be used afterwards.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let mut from = Restorer::new(snapshot);
-        if self.is_split() {
+        let Some((placer, adviser)) = &mut self.ahead else {
             return Err(from.unfit("parts of the loop are on other threads; join them first".to_owned()));
-        }
+        };
         from.part("ticks")?;
-        self.ticks = from.value()?;
-        loop_snapshot::restore(&mut self.world, &mut from)?;
-        self.readers.iter_mut().for_each(PortReader::clear);
+        (self.ticks, self.time) = from.value()?;
+        placer.restore(&mut from)?;
+        self.surveyor.restore(&mut from)?;
+        adviser.restore(&mut from)?;
+        self.alerter.restore(&mut from)?;
+        placer.report(sole(&mut self.placed, placer));
+        adviser.report(&mut self.advised);
         if from.is_empty() { Ok(()) } else { Err(from.unfit("it has extra bytes at its end".to_owned())) }
     }
 
     /// Frees the memory of the samples. After the end of a dive the report needs only the sections.
     pub fn release_samples(&mut self) {
-        self.world.resource_mut::<Coverage>().store.release();
+        self.surveyor.release_samples();
     }
 
     /// Whether packets are waiting in the rings.
     pub fn has_waiting(&self) -> bool {
-        self.readers.iter().any(|reader| reader.peek().is_some())
+        self.placer().is_some_and(Placer::has_waiting)
     }
 
     /// Codec counts of each source, in the order of the sources.
     pub fn decoder_counts(&self) -> Vec<CodecCounts> {
-        self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.counts()).collect()
+        self.ahead().0.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.counts()).collect()
     }
 
     /// Number of readings that each source's decoder understood but withheld, in the order of the sources.
     pub fn decoder_withheld(&self) -> Vec<u64> {
-        self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.withheld()).collect()
+        self.ahead().0.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.withheld()).collect()
     }
 
     /// Device clock statistics of each source, in the order of the sources.
     pub fn decoder_clocks(&self) -> Vec<Option<ClockReport>> {
-        self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.clock()).collect()
+        self.ahead().0.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.clock()).collect()
     }
+}
 
-    /// Digest of all results so far: poses, pings, judgements and advice.
-    pub fn digest(&self) -> u64 {
-        let digests = self.world.resource::<Digests>();
-        let mut all = Digest::default();
-        for (_, stream) in digests.streams() {
-            all.integer(stream.value());
-        }
-        all.value()
+/// The value behind an `Arc`, which no other reader has between ticks unless the loop was split.
+fn sole<'a>(placed: &'a mut Arc<Placed>, placer: &Placer) -> &'a mut Placed {
+    if Arc::get_mut(placed).is_none() {
+        *placed = Arc::new(placer.placed_with_room());
     }
+    #[expect(clippy::expect_used, reason = "a new one has no other reader")]
+    Arc::get_mut(placed).expect("no other reader")
 }

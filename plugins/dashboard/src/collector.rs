@@ -11,7 +11,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
 use headrace_monitor::live_text::{message_line, status_line};
-use headrace_monitor::messages::{Notice, Outcome as Placing, Placed, PlacedList};
+use headrace_monitor::messages::{Notice, Outcome as Placing};
 use headrace_monitor::report::go_back;
 use headrace_monitor::result_stream::{RecordKind, first_record};
 use headrace_monitor::run::Loop;
@@ -163,7 +163,7 @@ impl Collector {
     pub fn tick(&mut self, dive: &Loop) {
         self.gather(dive);
         let mut told = Vec::new();
-        self.teller.tick(dive.live_state(), dive, &mut |one| told.push(one));
+        self.teller.tick(dive.view().live_state(), dive, &mut |one| told.push(one));
         self.tell(&told, dive);
         let now = dive.now();
         self.played = Some(now);
@@ -235,7 +235,7 @@ impl Collector {
     /// Sends the end of the dive. Call it when all sections are judged.
     pub fn end(&mut self, dive: &Loop) {
         let mut told = Vec::new();
-        self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
+        self.teller.end(&dive.view().coverage().sections, &mut |one| told.push(one));
         self.tell(&told, dive);
         self.change_all(dive);
         if let Some(compared) = &mut self.compared {
@@ -250,13 +250,13 @@ impl Collector {
 
     /// Marks all sections of the dive as changed, because some change without a notice.
     fn change_all(&mut self, dive: &Loop) {
-        let (sections, way) = (&dive.coverage().sections, dive.coverage().frontier.way());
+        let (sections, way) = (&dive.view().coverage().sections, dive.view().coverage().frontier.way());
         self.changed.extend(sections.sections_of(way));
     }
 
     fn gather(&mut self, dive: &Loop) {
-        self.begun = self.begun.or_else(|| dive.tally().span.map(|(first, _)| first));
-        for event in dive.readings() {
+        self.begun = self.begun.or_else(|| dive.view().span().map(|(first, _)| first));
+        for event in dive.view().readings() {
             if let Reading::Echo(echo) = &event.reading
                 && let Some(sensor) = self.sensors.get_mut(event.source.index())
             {
@@ -271,7 +271,7 @@ impl Collector {
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn samples_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();
-        let mut words = dive.digests().pings.words();
+        let mut words = dive.view().surveyor().digests().pings.words();
         while let Some((record, rest)) = first_record(words) {
             words = rest;
             let outcome = match record.kind {
@@ -292,9 +292,7 @@ impl Collector {
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn aims_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();
-        let Some(placed) = dive.resource::<PlacedList>() else { return };
-        for one in &placed.0 {
-            let Placed::Ping(ping) = one else { continue };
+        for ping in dive.view().placed().pings() {
             let Placing::Lost(_, Some(aim)) = ping.outcome else { continue };
             let sample = SampleRecord {
                 t_ms: self.t_ms(ping.received),
@@ -357,7 +355,7 @@ impl Collector {
         if self.to.is_closed() || !self.waits && self.to.capacity() == 0 {
             return false;
         }
-        let sections = &dive.coverage().sections;
+        let sections = &dive.view().coverage().sections;
         if let Some(compared) = &mut self.compared {
             compared.refresh(dive, |index| _ = self.changed.insert(index));
         }
@@ -375,14 +373,14 @@ impl Collector {
             now,
             is_skipped: self.skips,
             begun: self.begun,
-            state: Box::new(dive.live_state_json()),
+            state: Box::new(dive.view().live_state_json()),
             beside: self.beside(dive),
             samples: core::mem::take(&mut self.samples),
             mended: self.mended(dive),
             sections: changed,
             told: core::mem::take(&mut self.told),
             notes: core::mem::take(&mut self.notes_due)
-                .then(|| dive.notes().iter().map(NoteJson::from).collect()),
+                .then(|| dive.view().notes().iter().map(NoteJson::from).collect()),
             back: self.back(dive),
             dropped: self.dropped,
         };
@@ -408,7 +406,7 @@ impl Collector {
         let Some([from_m, to_m]) = self.lacking_m.take() else { return Vec::new() };
         let (profile, t_ms) = (&dive.mission().profile, self.t_ms(dive.now()));
         let mut mended = Vec::new();
-        dive.coverage().store.each_between(from_m, to_m, |x_m, arc_m, _| {
+        dive.view().coverage().store.each_between(from_m, to_m, |x_m, arc_m, _| {
             if mended.len() < MOST_SAMPLES {
                 let [y_m, z_m] = profile.point_at(arc_m).map(|value| value as f32);
                 let arc = SampleRecord::arc_of(arc_m, profile.perimeter_m());
@@ -427,7 +425,7 @@ impl Collector {
     }
 
     fn take_rates(&mut self, now: MonoNs, dive: &Loop) {
-        let counts = dive.health().map(|health| health.readings);
+        let counts = dive.view().health().iter().map(|health| health.readings);
         let Some(from) = self.rates_from else {
             self.rates_from = Some(now);
             self.sensors.iter_mut().zip(counts).for_each(|(sensor, readings)| sensor.readings = readings);
@@ -445,7 +443,7 @@ impl Collector {
     }
 
     fn beside(&self, dive: &Loop) -> Beside {
-        let fix = dive.vehicle().fix.ok();
+        let fix = dive.view().vehicle().fix.ok();
         let pose = fix.map(|fix| {
             let (roll, pitch, yaw) = fix.pose.attitude.roll_pitch_yaw();
             let deg = |rad: f64| rounded(rad.to_degrees(), 100.0);
@@ -468,7 +466,8 @@ impl Collector {
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
         let text =
-            status_line(dive.live_state(), &dive.mission().profile, dive.head_descriptions(), &name).text();
+            status_line(dive.view().live_state(), &dive.mission().profile, dive.head_descriptions(), &name)
+                .text();
         let compared = self.compared.as_ref().map(Compared::json);
         Beside {
             pose,
@@ -490,7 +489,7 @@ impl Collector {
         }
         self.back_due = false;
         let (legs, mut at_m, mut way_m) =
-            (go_back(&dive.coverage().sections), dive.live_state().chainage_m, 0.0);
+            (go_back(&dive.view().coverage().sections), dive.view().live_state().chainage_m, 0.0);
         let mut time_s = Some(0.0);
         let mut shown = Vec::new();
         for leg in &legs {

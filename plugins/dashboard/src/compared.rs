@@ -49,7 +49,7 @@ impl Compared {
         }
         self.at = Some(now);
         let verdicts: BTreeMap<_, _> = dive.verdicts_at(self.target_m).into_iter().collect();
-        let section_m = dive.coverage().sections.section_m();
+        let section_m = dive.view().coverage().sections.section_m();
         let metres = |of: Verdict| section_m * verdicts.values().filter(|one| **one == of).count() as f64;
         self.json = ComparedJson {
             target_m: self.target_m,

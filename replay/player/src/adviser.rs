@@ -3,7 +3,6 @@
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::feed::work_off;
 use headrace_monitor::live_state::Condition;
-use headrace_monitor::messages::Notice;
 use headrace_monitor::ring::Port;
 use headrace_monitor::run::Loop;
 use headrace_monitor::{App, PluginError};
@@ -80,15 +79,12 @@ impl LoopAdviser {
 
 /// Returns the advice of the last tick, if any.
 fn told_by(dive: &Loop) -> Option<PilotAdvice> {
-    let last = dive.notices().iter().rev().find_map(|notice| match notice {
-        Notice::Advice(entry) => Some(entry),
-        _ => None,
-    })?;
-    let sections = &dive.coverage().sections;
+    let last = dive.view().advised().entries.last()?;
+    let sections = &dive.view().coverage().sections;
     let open = sections.runs().all().iter().filter(|run| run.is_open());
     let missed_m = open.map(|run| [sections.bounds_m(run.from).0, sections.bounds_m(run.to).0]).collect();
     let known = matches!(last.advice.reason, Reason::HelixPitch | Reason::AngularStep);
-    let state = dive.live_state();
+    let state = dive.view().live_state();
     let stand = state.asks_to_stand() || matches!(state.condition(), Condition::NoPosition(_));
     Some(PilotAdvice { at: last.at, v_max_mps: known.then_some(last.advice.v_max_mps), stand, missed_m })
 }

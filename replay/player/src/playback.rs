@@ -200,7 +200,7 @@ impl<'a> Playback<'a> {
     fn tick(&mut self, observer: &mut dyn PlaybackObserver) -> Result<(), PlaybackError> {
         let mut is_judged = false;
         self.advance(&mut |dive| {
-            is_judged |= dive.notices().iter().any(|notice| matches!(notice, Notice::Section { .. }));
+            is_judged |= dive.view().notices().any(|notice| matches!(notice, Notice::Section { .. }));
             observer.after_tick(dive);
         })?;
         self.mode = match self.mode {

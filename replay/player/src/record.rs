@@ -2,13 +2,13 @@
 
 use headrace_monitor::App;
 use headrace_monitor::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
-use headrace_monitor::resources::{Digests, TickTime};
+use headrace_monitor::outlet::Outlet;
+use headrace_monitor::resources::TickTime;
 use headrace_monitor::result_stream::ResultStream;
 use headrace_monitor::run::Loop;
-use headrace_monitor::stage::Stage;
+use headrace_monitor::view::DiveView;
 use headrace_monitor::{Plugin, PluginError};
 
-use bevy_ecs::prelude::{Res, ResMut, Resource};
 use std::cell::Cell;
 
 use crate::log::format::RESULT_PREFIX;
@@ -60,7 +60,7 @@ pub fn result_channels() -> Vec<ResultChannel> {
 /// Each message has the number of its channel. The loop must keep its results. This function allocates, so it may be
 /// called only by outlets between ticks.
 pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
-    let streams = (0..).zip(dive.digests().streams());
+    let streams = (0..).zip(dive.view().streams());
     let filled = streams.filter(|(_, (_, trail))| !trail.words().is_empty());
     let message = |(channel, (_, trail)): (u16, (&str, &ResultStream))| {
         let mut message = Vec::with_capacity((trail.words().len() + HEAD_WORDS) * 8);
@@ -100,7 +100,6 @@ impl RecorderOutlet {
     }
 }
 
-#[derive(Resource)]
 struct Recording {
     ports: Vec<RecorderPort>,
     is_of_ports: bool,
@@ -116,46 +115,43 @@ impl Plugin for RecorderOutlet {
         let ports = self.ports.take();
         if !ports.is_empty() {
             app.keep_results();
-            app.insert_resource(Recording {
+            app.add_outlet(Recording {
                 ports,
                 is_of_ports: self.is_of_ports,
                 order: Vec::with_capacity(MAX_TICK_PACKETS),
                 message: Vec::with_capacity(MAX_RESULT_BYTES),
                 records: [0; STREAMS.len()],
             });
-            app.add_systems(Stage::Publish, record);
         }
         Ok(())
     }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
-fn record(
-    mut inbox: ResMut<'_, Inbox>,
-    time: Res<'_, TickTime>,
-    results: Res<'_, Digests>,
-    mut recording: ResMut<'_, Recording>,
-) {
-    let Recording { ports, is_of_ports, order, message, records } = &mut *recording;
-    let packets = inbox.iter().map(|(_, packet)| RecorderPort::entry_bytes(packet.bytes.len()));
-    let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
-    let needed = bytes + RecorderPort::tick_entry_bytes(count);
-    for port in ports.iter_mut().filter(|port| !port.is_closed()) {
-        // A recorder that skips ticks resumes only with ample room, and not with each small tick that would fit.
-        let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
-        if count > 0 && port.vacant_bytes() < needed {
-            // Ticks are skipped only in a dive that reads ports. In other dives the allowance has reserved the room.
-            port.skip(time.now, count as u64);
-            continue;
+impl Outlet for Recording {
+    fn publish(&mut self, dive: &DiveView<'_>) -> usize {
+        let Self { ports, is_of_ports, order, message, records } = self;
+        let (inbox, time, streams) = (&dive.placed().inbox, dive.time(), dive.streams());
+        let packets = inbox.iter().map(|(_, packet)| RecorderPort::entry_bytes(packet.bytes.len()));
+        let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
+        let needed = bytes + RecorderPort::tick_entry_bytes(count);
+        for port in ports.iter_mut().filter(|port| !port.is_closed()) {
+            // A recorder that skips ticks resumes only with ample room, and not with each small tick that would fit.
+            let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
+            if count > 0 && port.vacant_bytes() < needed {
+                // Ticks are skipped only in a dive that reads ports. In other dives the allowance has reserved the
+                // room.
+                port.skip(time.now, count as u64);
+                continue;
+            }
+            record_tick(port, inbox, &time, order);
+            record_results(port, &streams, &time, message, records);
         }
-        record_tick(port, &inbox, &time, order);
-        record_results(port, &results, &time, message, records);
+        for ((_, stream), before) in streams.into_iter().zip(records) {
+            *before = stream.records();
+        }
+        let open = ports.iter().filter(|port| !port.is_closed());
+        allowance_bytes(open, *is_of_ports)
     }
-    for ((_, trail), before) in results.streams().into_iter().zip(records) {
-        *before = trail.records();
-    }
-    let open = ports.iter().filter(|port| !port.is_closed());
-    inbox.allowance_bytes = allowance_bytes(open, *is_of_ports);
 }
 
 /// Returns how many bytes of packets the next tick may consume.
@@ -189,12 +185,12 @@ fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &
 /// Input has priority, so results that don't fit are left out. Gaps in the record numbers show that.
 fn record_results(
     port: &mut RecorderPort,
-    results: &Digests,
+    streams: &[(&str, &ResultStream)],
     time: &TickTime,
     message: &mut Vec<u8>,
     records: &[u64; STREAMS.len()],
 ) {
-    let streams = results.streams().into_iter().zip(records).take(port.result_channels());
+    let streams = streams.iter().zip(records).take(port.result_channels());
     for (channel, ((_, trail), before)) in (0..).zip(streams) {
         if !trail.words().is_empty() {
             let whole = fill(message, time.index, *before, trail.words());

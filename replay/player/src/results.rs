@@ -5,7 +5,7 @@
 
 use crate::log::format::RESULT_PREFIX;
 
-/// Names of the streams of results, in the order of [`headrace_monitor::resources::Digests::streams`].
+/// Names of the streams of results, in the order of [`headrace_monitor::view::DiveView::streams`].
 pub(crate) const STREAMS: [&str; 6] = ["poses", "pings", "judgements", "advice", "states", "alerts"];
 /// Number of words in a message before its records.
 pub(crate) const HEAD_WORDS: usize = 2;

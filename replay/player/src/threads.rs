@@ -1,8 +1,8 @@
 //! Drives a loop from a log on several threads, or several loops that share one navigation.
 //!
-//! One thread reads, decodes, navigates and places pings. Another one advises. The caller's thread does the rest.
-//! Bounded queues pass batches of ticks between the threads. Each stage processes all ticks in order, so the results
-//! are identical bit for bit on any number of threads: see [`headrace_monitor::split`].
+//! The placer runs on one thread, the adviser on another, and the rest on the caller's. Bounded queues pass batches of
+//! ticks between the threads. Each part processes all ticks in order, so the results are identical bit for bit on any
+//! number of threads.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -10,9 +10,10 @@ use std::thread::ScopedJoinHandle;
 
 use crossbeam::channel::{Receiver, bounded};
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::adviser::{Advised, Adviser};
+use headrace_monitor::merge::MAX_TICK_BYTES;
+use headrace_monitor::placer::{Placed, Placer};
 use headrace_monitor::run::Loop;
-use headrace_monitor::split::{Advising, PlacedTick, Placer};
-use headrace_sampling::advice::Advice;
 
 use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
 
@@ -26,30 +27,44 @@ const MOST_WAITING: usize = 4;
 /// Capacity of the queue of used batches. It fits the batches of two queues, and the batches being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 
-/// A batch of ticks, with their placed pings and their advice.
+/// A tick, with its placed pings and its advice.
+#[derive(Default)]
+struct Tick {
+    /// End of the tick's time.
+    now: MonoNs,
+    placed: Arc<Placed>,
+    advised: Advised,
+}
+
+/// A batch of ticks.
 #[derive(Default)]
 struct Batch {
-    ticks: Vec<PlacedTick>,
-    advice: Vec<Vec<Advice>>,
+    ticks: Vec<Tick>,
     /// Number of ticks in use. Further elements are kept for reuse.
     len: usize,
 }
 
 impl Batch {
-    /// Returns an element for the next tick.
-    fn next(&mut self) -> &mut PlacedTick {
+    /// Runs the placer for the next tick.
+    fn place(&mut self, placer: &mut Placer, now: MonoNs) {
         if self.len == self.ticks.len() {
-            self.ticks.push(PlacedTick::default());
-            self.advice.push(Vec::new());
+            self.ticks.push(Tick::default());
+        }
+        let tick = &mut self.ticks[self.len];
+        tick.now = now;
+        // A loop still reads its last tick. The others are free.
+        if Arc::get_mut(&mut tick.placed).is_none() {
+            tick.placed = Arc::default();
+        }
+        if let Some(placed) = Arc::get_mut(&mut tick.placed) {
+            placer.tick(MAX_TICK_BYTES, placed);
         }
         self.len += 1;
-        let last = self.len - 1;
-        &mut self.ticks[last]
     }
 
-    fn advise(&mut self, advising: &mut Advising) {
-        for (tick, advice) in self.ticks.iter().zip(&mut self.advice).take(self.len) {
-            advising.advise(tick, advice);
+    fn advise(&mut self, adviser: &mut Adviser) {
+        for tick in self.ticks.iter_mut().take(self.len) {
+            adviser.tick(&tick.placed, &mut tick.advised);
         }
     }
 }
@@ -57,7 +72,7 @@ impl Batch {
 /// Runs the loop until the source ends, as fast as possible, on up to `threads` threads including the caller's.
 ///
 /// `after_tick` is called on the caller's thread after every tick. The results equal those of [`drive`], which runs
-/// instead if `threads` is one, or if a plugin adds systems to the placing of pings.
+/// instead if `threads` is one.
 ///
 /// Errors: see [`DriveError`]. Packets fed before the error have been processed, unless a thread has panicked.
 pub fn drive_on(
@@ -68,14 +83,14 @@ pub fn drive_on(
     after_tick: &mut dyn FnMut(&Loop),
 ) -> Result<(), DriveError> {
     let parts = if threads > 1 { dive.split() } else { None };
-    let Some((mut placer, mut advising)) = parts else {
+    let Some((mut placer, mut adviser)) = parts else {
         return drive(dive, source, Pace { tick, speed: None }, after_tick);
     };
     let driven = Driver::new(dive, tick).and_then(|driver| {
-        drive_parts(threads, dive, (&mut placer, driver), source, &mut advising, after_tick)
+        drive_parts(threads, dive, (&mut placer, driver), source, &mut adviser, after_tick)
     });
     if !matches!(driven, Err(DriveError::Panicked { .. })) {
-        dive.join(placer, advising);
+        dive.join(placer, adviser);
     }
     driven
 }
@@ -85,7 +100,7 @@ fn drive_parts(
     dive: &mut Loop,
     (placer, driver): (&mut Placer, Driver),
     source: &mut (dyn PacketSource + Send),
-    advising: &mut Advising,
+    adviser: &mut Adviser,
     after_tick: &mut dyn FnMut(&Loop),
 ) -> Result<(), DriveError> {
     std::thread::scope(|scope| {
@@ -93,15 +108,15 @@ fn drive_parts(
         let (to, placed) = bounded::<Batch>(MOST_WAITING);
         let placing =
             scope.spawn(move || place(placer, driver, source, &unused, &mut |batch| to.send(batch).is_ok()));
-        let (mut advising, mut beside, mut batches) = (Some(advising), None, placed);
+        let (mut adviser, mut beside, mut batches) = (Some(adviser), None, placed);
         if threads >= MOST_THREADS
-            && let Some(advising) = advising.take()
+            && let Some(adviser) = adviser.take()
         {
             let (to, advised) = bounded(MOST_WAITING);
             let placed = core::mem::replace(&mut batches, advised);
             beside = Some(scope.spawn(move || {
                 for mut batch in placed {
-                    batch.advise(advising);
+                    batch.advise(adviser);
                     if to.send(batch).is_err() {
                         return;
                     }
@@ -109,11 +124,11 @@ fn drive_parts(
             }));
         }
         for mut batch in batches {
-            if let Some(advising) = &mut advising {
-                batch.advise(advising);
+            if let Some(adviser) = &mut adviser {
+                batch.advise(adviser);
             }
-            for (tick, advice) in batch.ticks.iter_mut().zip(&mut batch.advice).take(batch.len) {
-                run_tick(dive, &mut |dive| dive.tick_taken(tick, advice), after_tick);
+            for tick in batch.ticks.iter_mut().take(batch.len) {
+                run_tick(dive, tick, after_tick);
             }
             // An error means that the placing thread has ended and needs no batches.
             used.try_send(batch).ok();
@@ -123,9 +138,9 @@ fn drive_parts(
     })
 }
 
-/// Runs the later stages of a tick. Waits while an outlet is too slow.
-fn run_tick(dive: &mut Loop, tick: &mut dyn FnMut(&mut Loop) -> bool, after_tick: &mut dyn FnMut(&Loop)) {
-    while !tick(dive) {
+/// Runs the rest of a tick. Waits while an outlet is too slow.
+fn run_tick(dive: &mut Loop, tick: &mut Tick, after_tick: &mut dyn FnMut(&Loop)) {
+    while !dive.tick_placed(tick.now, &tick.placed, &mut tick.advised) {
         after_tick(dive);
         pause();
     }
@@ -138,15 +153,15 @@ fn place(
     mut driver: Driver,
     source: &mut dyn PacketSource,
     unused: &Receiver<Batch>,
-    hand_over: &mut dyn FnMut(Batch) -> bool,
+    pass_on: &mut dyn FnMut(Batch) -> bool,
 ) -> Result<(), DriveError> {
     let (mut batch, mut is_wanted) = (Batch::default(), true);
     let mut work_off = |now: MonoNs| {
         loop {
-            placer.tick(now, batch.next());
+            batch.place(placer, now);
             if batch.len == BATCH_TICKS {
                 let next = Batch { len: 0, ..unused.try_recv().unwrap_or_default() };
-                is_wanted &= hand_over(core::mem::replace(&mut batch, next));
+                is_wanted &= pass_on(core::mem::replace(&mut batch, next));
             }
             if !placer.has_waiting() {
                 return is_wanted;
@@ -167,7 +182,7 @@ fn place(
             Err(error) => break Err(error),
         }
     };
-    hand_over(batch);
+    pass_on(batch);
     placed
 }
 
@@ -193,9 +208,9 @@ pub fn drive_together(
         let split = if is_alike { dive.split() } else { None };
         parts.push(split.ok_or(DriveError::Unlike { number })?);
     }
-    let (mut placers, mut advising): (Vec<Placer>, Vec<Advising>) = parts.into_iter().unzip();
+    let (mut placers, mut advisers): (Vec<Placer>, Vec<Adviser>) = parts.into_iter().unzip();
     let Some((placer, others)) = placers.split_first_mut() else { return Ok(()) };
-    let parted: Vec<(&mut Loop, &mut Advising)> = dives.iter_mut().zip(&mut advising).collect();
+    let parted: Vec<(&mut Loop, &mut Adviser)> = dives.iter_mut().zip(&mut advisers).collect();
     let driven = drive_all(threads, parted, (placer, driver), source);
     if let Err(DriveError::Panicked { .. }) = driven {
         return driven;
@@ -203,22 +218,22 @@ pub fn drive_together(
     for (number, other) in (1..).zip(others) {
         other.take_over(placer).map_err(|_| DriveError::Unlike { number })?;
     }
-    for ((dive, placer), advising) in dives.iter_mut().zip(placers).zip(advising) {
-        dive.join(placer, advising);
+    for ((dive, placer), adviser) in dives.iter_mut().zip(placers).zip(advisers) {
+        dive.join(placer, adviser);
     }
     driven
 }
 
 fn drive_all(
     threads: usize,
-    mut dives: Vec<(&mut Loop, &mut Advising)>,
+    mut dives: Vec<(&mut Loop, &mut Adviser)>,
     (placer, driver): (&mut Placer, Driver),
     source: &mut dyn PacketSource,
 ) -> Result<(), DriveError> {
     let (used, unused) = bounded(MOST_UNUSED);
     if threads < 2 {
         return place(placer, driver, source, &unused, &mut |batch| {
-            cover_all(&mut dives, &batch);
+            survey_all(&mut dives, &batch);
             used.try_send(batch).is_ok()
         });
     }
@@ -232,7 +247,7 @@ fn drive_all(
             queues.push(to);
             covering.push(scope.spawn(move || {
                 for batch in placed {
-                    cover_all(&mut some, &batch);
+                    survey_all(&mut some, &batch);
                     // The last loop returns the batch. An error means that the placing thread has ended and needs no
                     // batches.
                     if let Some(batch) = Arc::into_inner(batch) {
@@ -247,19 +262,20 @@ fn drive_all(
         });
         drop(queues);
         for covering in covering {
-            joined(covering, "covers the wall")?;
+            joined(covering, "surveys the wall")?;
         }
         placed
     })
 }
 
-/// Runs the later stages of a batch in each loop.
-fn cover_all(dives: &mut [(&mut Loop, &mut Advising)], batch: &Batch) {
-    let mut advice = Vec::new();
-    for (dive, advising) in dives {
+/// Runs the rest of a batch in each loop, with the advice for its target.
+fn survey_all(dives: &mut [(&mut Loop, &mut Adviser)], batch: &Batch) {
+    let mut own = Tick::default();
+    for (dive, adviser) in dives {
         for tick in batch.ticks.iter().take(batch.len) {
-            advising.advise(tick, &mut advice);
-            run_tick(dive, &mut |dive| dive.tick_placed(tick, &advice), &mut |_| ());
+            (own.now, own.placed) = (tick.now, Arc::clone(&tick.placed));
+            adviser.tick(&own.placed, &mut own.advised);
+            run_tick(dive, &mut own, &mut |_| ());
         }
     }
 }

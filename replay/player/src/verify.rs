@@ -181,8 +181,7 @@ impl Verifier {
     ///
     /// Errors: reading the log fails.
     pub fn after_tick(&mut self, dive: &Loop) -> Result<(), LogError> {
-        let digests = dive.digests();
-        for (number, (name, trail)) in digests.streams().into_iter().enumerate() {
+        for (number, (name, trail)) in dive.view().streams().into_iter().enumerate() {
             let mut rest = trail.words();
             while let Some((record, after)) = first_record(rest) {
                 rest = after;

@@ -12,11 +12,12 @@ use std::sync::Arc;
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use headrace_fusion::Navigation;
 use headrace_geometry::time::MonoNs;
-use headrace_monitor::messages::{Outcome, Placed, PlacedList};
+use headrace_monitor::messages::Outcome;
+use headrace_monitor::placer::PlacedTick;
 use headrace_monitor::report::{Report, SectionReport};
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::run::Loop;
-use headrace_monitor::stage::Stage;
+use headrace_monitor::stage::SurveyStage;
 use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::drive::{Coming, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
@@ -215,7 +216,11 @@ impl Recorded {
     /// Compares the report of a replayed loop with the truth.
     pub fn judge(&self, dive: &Loop) -> JudgedDive {
         let report = Report::of(dive);
-        let shifts = dive.resource::<Seen>().map_or_else(Shifts::default, |seen| seen.shifts(&self.scenery));
+        let shifts = dive
+            .view()
+            .surveyor()
+            .resource::<Seen>()
+            .map_or_else(Shifts::default, |seen| seen.shifts(&self.scenery));
         let judge = |section: &SectionReport| {
             let shift_m = shifts.about(section.start_m, section.end_m);
             let true_hole_m = self.true_hole_m(section.start_m + shift_m, section.end_m + shift_m);
@@ -302,18 +307,16 @@ struct Watch;
 
 impl Plugin for Watch {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.insert_resource(Seen::default());
-        app.add_systems(Stage::Judge, watch);
+        app.surveyor.insert_resource(Seen::default());
+        app.surveyor.add_systems(SurveyStage::Surveyed, watch);
         Ok(())
     }
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
-fn watch(placed: Res<'_, PlacedList>, mut seen: ResMut<'_, Seen>) {
-    for item in &placed.0 {
-        if let Placed::Ping(ping) = item
-            && let (Outcome::Sample { point, .. }, Some(fix)) = (ping.outcome, ping.fix)
-        {
+fn watch(placed: Res<'_, PlacedTick>, mut seen: ResMut<'_, Seen>) {
+    for ping in placed.pings() {
+        if let (Outcome::Sample { point, .. }, Some(fix)) = (ping.outcome, ping.fix) {
             seen.0.push((ping.valid_at, point.x(), fix.pose.position.x()));
         }
     }

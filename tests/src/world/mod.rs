@@ -23,8 +23,7 @@ use headrace::line_record::InRecordings;
 use headrace_config::Document;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
-use headrace_monitor::merge::Inbox;
-use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
+use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
 use headrace_ports::{Attached, Common, LineHistory, LineRecord, LineService, StatusQueue, Waker};
 use headrace_replay::drive::{Pace, drive};
@@ -296,7 +295,7 @@ impl World {
         let power_cut = (plan.ending == Ending::PowerCut).then_some(&mut random);
         DiveResult {
             lines: lines.collect(),
-            digest: dive.digest(),
+            digest: dive.view().digest(),
             summary,
             disk_failures: disk.failures(),
             left: disk.left(power_cut),
@@ -402,7 +401,7 @@ fn replayed(files: &[PathBuf]) -> Result<Replayed, String> {
     let driven = drive(&mut dive, &mut player, Pace::default(), &mut |dive| note(dive, &mut consumed));
     driven.map_err(|error| error.to_string())?;
     dive.finish(&mut |_, _| ());
-    Ok(Replayed { consumed, digest: dive.digest(), losses: player.losses() })
+    Ok(Replayed { consumed, digest: dive.view().digest(), losses: player.losses() })
 }
 
 fn vehicle(text: &str) -> VehicleConfig {
@@ -465,7 +464,7 @@ fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
 }
 
 fn note(dive: &Loop, consumed: &mut Vec<Consumed>) {
-    let inbox = dive.resource::<Inbox>().unwrap();
+    let inbox = &dive.view().placed().inbox;
     consumed.extend(inbox.iter().map(|(source, packet)| Consumed {
         source: source.0,
         received: packet.received,

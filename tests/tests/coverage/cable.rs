@@ -1,10 +1,10 @@
 //! A cable counter that gets stuck while the vehicle moves. The fault is reported at once and passes no section.
 
-use bevy_ecs::prelude::{Res, ResMut, Resource, Single};
+use bevy_ecs::prelude::{Res, ResMut, Resource};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::alerts::{AlertKind, Alerts};
-use headrace_monitor::entities::VehicleState;
-use headrace_monitor::stage::Stage;
+use headrace_monitor::placer::PlacedTick;
+use headrace_monitor::stage::SurveyStage;
 use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
@@ -64,16 +64,16 @@ struct Watch;
 
 impl Plugin for Watch {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.insert_resource(Told::default());
-        app.add_systems(Stage::Judge, watch);
+        app.surveyor.insert_resource(Told::default());
+        app.surveyor.add_systems(SurveyStage::Surveyed, watch);
         Ok(())
     }
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
-fn watch(alerts: Res<'_, Alerts>, mut told: ResMut<'_, Told>, vehicle: Single<'_, '_, &VehicleState>) {
+fn watch(placed: Res<'_, PlacedTick>, alerts: Res<'_, Alerts>, mut told: ResMut<'_, Told>) {
     if alerts.get(AlertKind::CableDoubted, None).is_some() {
-        told.0 = told.0.or(vehicle.at);
+        told.0 = told.0.or(placed.vehicle.at);
     }
 }
 
@@ -89,8 +89,8 @@ fn told_after_s(stuck: &Stuck) -> Option<f64> {
     let simulation = Simulation::new(&stuck.scene).unwrap();
     drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
     dive.finish(&mut |_, _| {});
-    let told = dive.resource::<Told>().unwrap().0;
-    let began = dive.tally().span.unwrap().0;
+    let told = dive.view().surveyor().resource::<Told>().unwrap().0;
+    let began = dive.view().span().unwrap().0;
     told.map(|at| at.since(began).as_secs_f64() - stuck.from_s)
 }
 

@@ -54,7 +54,7 @@ struct Wrong {
 fn wrong(scene: &Scene, most_mps: f64) -> Wrong {
     let mut wrong = Wrong::default();
     let dive = truth::dive_noting(scene, &scene.vehicle, &mut |dive| {
-        if let Ok(fix) = dive.vehicle().fix {
+        if let Ok(fix) = dive.view().vehicle().fix {
             wrong.speed_mps = wrong.speed_mps.max(fix.speed_mps - most_mps).max(-fix.speed_mps);
         }
     });

@@ -39,7 +39,7 @@ fn dive(parked_s: u32, rounds: usize) -> (JudgedDive, Vec<usize>) {
     let mut note = |dive: &Loop| {
         ticks += 1;
         if ticks.is_multiple_of(3000) {
-            used.push(dive.coverage().store.usage().bytes);
+            used.push(dive.view().coverage().store.usage().bytes);
         }
     };
     (truth::dive_noting(&scene, &scene.vehicle, &mut note), used)

@@ -17,7 +17,7 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoint
 
 /// Amounts that may grow in an armed loop: bytes of samples, and entries of the advice's history.
 fn used(dive: &Loop) -> [usize; 2] {
-    [dive.coverage().store.usage().bytes, dive.advice_log().entries.len()]
+    [dive.view().coverage().store.usage().bytes, dive.advice_log().entries.len()]
 }
 
 #[test]

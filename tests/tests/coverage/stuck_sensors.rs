@@ -1,7 +1,6 @@
 //! Stuck devices: a head or inertial unit that repeats its output for ever counts as silent.
 
 use headrace_coverage::Cause;
-use headrace_monitor::messages::Notice;
 use headrace_simulator::Scene;
 use headrace_tests::{scenes, truth};
 
@@ -41,10 +40,8 @@ struct Told {
 fn dive(scene: &Scene) -> Told {
     let mut v_max_mps = 0.0;
     let judged = truth::dive_noting(scene, &scene.vehicle, &mut |dive| {
-        for notice in dive.notices() {
-            if let Notice::Advice(entry) = notice {
-                v_max_mps = entry.advice.v_max_mps;
-            }
+        if let Some(last) = dive.view().advised().entries.last() {
+            v_max_mps = last.advice.v_max_mps;
         }
     });
     let passed = judged.sections.iter().filter(|section| section.report.verdict == "pass");

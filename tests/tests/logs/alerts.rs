@@ -104,7 +104,7 @@ fn dive(scene: &Scene, packets: &[Packet], tick_ms: i64) -> (Loop, Vec<Change>) 
         if packet.at >= until || !port.has_room(packet.bytes.len()) {
             while dive.has_waiting() {
                 dive.tick(packet.at);
-                dive.notices().iter().for_each(|notice| take(notice, &mut changes));
+                dive.view().notices().for_each(|notice| take(&notice, &mut changes));
             }
             while packet.at >= until {
                 until = until + DurNs::from_millis(tick_ms);
@@ -114,14 +114,14 @@ fn dive(scene: &Scene, packets: &[Packet], tick_ms: i64) -> (Loop, Vec<Change>) 
     }
     while dive.has_waiting() {
         dive.tick(until);
-        dive.notices().iter().for_each(|notice| take(notice, &mut changes));
+        dive.view().notices().for_each(|notice| take(&notice, &mut changes));
     }
     dive.finish(&mut |notice, _| take(notice, &mut changes));
     (dive, changes)
 }
 
 fn streams(dive: &Loop) -> Vec<(&'static str, u64)> {
-    dive.digests().streams().into_iter().map(|(name, stream)| (name, stream.value())).collect()
+    dive.view().streams().into_iter().map(|(name, stream)| (name, stream.value())).collect()
 }
 
 fn json(dive: &Loop) -> Value {
@@ -143,7 +143,7 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
         assert!(done.iter().any(|done| done.as_str() == change), "{change}");
     }
     // An alert requires no action once its condition is over.
-    let around = expected.surroundings();
+    let around = expected.view().surroundings();
     let asks = |alert: &&ListedAlert| !alert.advice(&around).is_empty();
     let (holding, over): (Vec<_>, Vec<_>) =
         told.iter().map(|(.., alert)| alert).partition(|alert| alert.state == AlertState::Active);
@@ -156,7 +156,7 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
     assert_eq!(voice["voice"], serde_json::json!({"id": 7, "seconds": 5}));
     assert_eq!(voice["at_s"], after(20.0).as_secs_f64(), "the note has the time at which it began");
     let counts = ConsoleCounts { packets: 14, invalid: 1, without_effect: 2 };
-    assert_eq!(expected.console_counts(), counts);
+    assert_eq!(expected.view().console_counts(), counts);
     assert_eq!(report["sources"].as_array().unwrap().len(), scene.vehicle.sensors.len());
     for tick_ms in [1, 333, 5000] {
         let (other, also_told) = dive(&scene, &packets, tick_ms);
@@ -192,7 +192,7 @@ fn commands_change_no_result_except_alerts() {
     }
     let (odd, _) = dive(&scene, &packets, 20);
     assert_eq!(streams(&odd), streams(&plain));
-    assert_eq!(odd.console_counts(), ConsoleCounts { packets: 4, invalid: 4, without_effect: 0 });
+    assert_eq!(odd.view().console_counts(), ConsoleCounts { packets: 4, invalid: 4, without_effect: 0 });
 }
 
 #[test]
@@ -208,7 +208,7 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
     let too_fast = raised(ListKind::TooFast);
     assert!(matches!(too_fast[..], [first, again] if first < 10.0 && again > 100.0), "{too_fast:?}");
     // When its condition is over, the alert still shows the speed that was too fast, not a later one.
-    let fast = dive.alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
+    let fast = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
     let Figures::Advice(figures) = fast.figures else { panic!("{:?}", fast.figures) };
     assert!(figures.speed_mps > 1.2 * figures.v_max_mps, "{figures:?}");
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
@@ -216,19 +216,19 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
     };
     // The alert comes 2 s after the head's last reading, plus one update. No latch time is configured.
     assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
-    let head = dive.alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
+    let head = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
     assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");
     assert_eq!(head.state, AlertState::Rectified, "the head returned, and the alert is unacknowledged");
     // The missed stretch has one alert, although a later pass has filled a part of it.
     let missed = raised(ListKind::Missed);
-    let runs = dive.coverage().sections.runs().all();
+    let runs = dive.view().coverage().sections.runs().all();
     assert!(missed.len() <= runs.len() && !missed.is_empty(), "{missed:?}, {} runs", runs.len());
     for run in runs.iter().filter(|run| run.is_open()) {
         let holds = |alert: &&ListedAlert| {
             let within = alert.stretch.is_some_and(|(from, to)| from <= run.from && run.to <= to);
             alert.kind == ListKind::Missed && alert.state == AlertState::Active && within
         };
-        assert_eq!(dive.alert_list().iter().filter(holds).count(), 1, "{run:?}");
+        assert_eq!(dive.view().alert_list().iter().filter(holds).count(), 1, "{run:?}");
     }
 }
 
@@ -249,7 +249,7 @@ fn dive_with_only_silent_sensors_raises_alerts_in_time() {
     assert!((2.0..=2.6).contains(&at.since(last).as_secs_f64()), "{:?}", at.since(last));
     let of_one = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
     assert_eq!(of_one, 0, "one situation, not one for each sensor");
-    assert_eq!(dive.tally().span.unwrap().1, last, "operator input counts as a sensor");
+    assert_eq!(dive.view().span().unwrap().1, last, "operator input counts as a sensor");
 }
 
 /// The timestamp of a command from another thread is the dive's clock.
@@ -272,16 +272,16 @@ fn commands_from_any_thread_reach_the_loop() {
     });
     let taken: usize = threads.into_iter().map(|thread| thread.join().unwrap()).sum();
     assert_eq!(taken, 256, "the number of waiting commands is bounded");
-    while dive.notes().iter().count() < taken {
+    while dive.view().notes().iter().count() < taken {
         input.take_in(MonoNs(7));
         dive.tick(MonoNs(8));
     }
-    assert!(dive.notes().iter().all(|note| note.at == MonoNs(7) && note.by == by));
+    assert!(dive.view().notes().iter().all(|note| note.at == MonoNs(7) && note.by == by));
     let recording = Command::Recording { fails: true };
     port.send(&recording).unwrap();
     input.take_in(MonoNs(9));
     dive.tick(MonoNs(9));
-    assert_eq!(dive.alert_list().counts().unacknowledged, 1);
+    assert_eq!(dive.view().alert_list().counts().unacknowledged, 1);
 }
 
 #[test]

@@ -4,13 +4,10 @@ use std::io::Write;
 use std::process::{Output, Stdio};
 use std::time::Duration;
 
-use bevy_ecs::prelude::{Res, ResMut, Resource};
 use crossbeam::channel::unbounded;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::merge::Inbox;
+use headrace_monitor::App;
 use headrace_monitor::run::Loop;
-use headrace_monitor::stage::Stage;
-use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{LogHeader, LogWriter, SourceInfo, files_of};
 use headrace_replay::playback::{Playback, PlaybackCommand, PlaybackObserver};
@@ -32,7 +29,7 @@ impl PlaybackObserver for Stops {
     fn after_skipped_tick(&mut self, _: &Loop) {}
 
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
-        self.0.push((at, dive.ticks(), dive.digest(), ended));
+        self.0.push((at, dive.ticks(), dive.view().digest(), ended));
     }
 }
 
@@ -62,27 +59,8 @@ struct Outcome {
 
 impl Outcome {
     fn of(dive: &Loop, player: &Player) -> Self {
-        Self { digest: dive.digest(), messages: player.played(), losses: player.losses() }
+        Self { digest: dive.view().digest(), messages: player.played(), losses: player.losses() }
     }
-}
-
-/// Sources of the packets in the order in which the loop consumes them.
-#[derive(Resource, Default)]
-struct Consumed(Vec<u16>);
-
-struct Watch;
-
-impl Plugin for Watch {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.insert_resource(Consumed::default());
-        app.add_systems(Stage::Publish, watch);
-        Ok(())
-    }
-}
-
-#[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
-fn watch(inbox: Res<'_, Inbox>, mut consumed: ResMut<'_, Consumed>) {
-    consumed.0.extend(inbox.iter().map(|(source, _)| source.0));
 }
 
 /// A headrace log replays in the recorded order of consumption, which can differ from the order of receive times. A
@@ -97,7 +75,6 @@ fn headrace_log_replays_in_consumed_order_and_others_by_time() {
         for sensor in vehicle().sensors.iter().take(3) {
             app.add_device(sensor.as_ref()).unwrap();
         }
-        app.add_plugin(&Watch).unwrap();
         let mut dive = app.arm(vehicle().navigation()).unwrap();
         let named = |id: &str| SourceInfo { id: id.to_owned(), ..SourceInfo::default() };
         let sources = dive.sources().iter().map(|source| named(&source.id)).collect();
@@ -113,8 +90,12 @@ fn headrace_log_replays_in_consumed_order_and_others_by_time() {
         folder.write("order.mcap", bytes);
         let mut player = Player::open(&files_of(&[folder.path("order.mcap")]).unwrap()).unwrap();
         player.connect(dive.sources());
-        drive(&mut dive, &mut player, Pace::default(), &mut |_| {}).unwrap();
-        assert_eq!(dive.resource::<Consumed>().unwrap().0, wanted, "ticks: {ticks}");
+        // Sources of the packets in the order in which the loop consumes them.
+        let mut consumed = Vec::new();
+        let mut note =
+            |dive: &Loop| consumed.extend(dive.view().placed().inbox.iter().map(|(source, _)| source.0));
+        drive(&mut dive, &mut player, Pace::default(), &mut note).unwrap();
+        assert_eq!(consumed, wanted, "ticks: {ticks}");
     }
 }
 
@@ -142,7 +123,7 @@ fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     player.connect(dive.sources());
     let mut ticks = Vec::new();
     drive(&mut dive, &mut player, Pace::default(), &mut |dive| {
-        ticks.push((dive.now(), dive.ticks(), dive.digest()));
+        ticks.push((dive.now(), dive.ticks(), dive.view().digest()));
     })
     .unwrap();
     (ticks, Outcome::of(&dive, &player))

@@ -3,14 +3,18 @@
 //! The ticks are the same for every kind of end of the feed.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use headrace_geometry::time::DurNs;
 use headrace_monitor::merge::{Inbox, MAX_TICK_BYTES};
+use headrace_monitor::outlet::Outlet;
 use headrace_monitor::report::Report;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::run::Loop;
-use headrace_monitor::stage::Stage;
+use headrace_monitor::stage::PlaceStage;
+use headrace_monitor::view::DiveView;
 use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::drive::{Coming, DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
@@ -88,14 +92,14 @@ fn armed(vehicle: &VehicleConfig, plugin: Option<&dyn Plugin>) -> Loop {
 /// Digest of all public data of a loop after a tick.
 fn of_tick(dive: &Loop) -> u64 {
     let mut hasher = DefaultHasher::new();
-    let inbox = dive.resource::<Inbox>().unwrap();
+    let inbox = &dive.view().placed().inbox;
     inbox.iter().for_each(|(source, packet)| (source.0, packet.received.0, packet.bytes).hash(&mut hasher));
-    for (name, stream) in dive.digests().streams() {
+    for (name, stream) in dive.view().streams() {
         (name, stream.value(), stream.words(), stream.records(), stream.lost()).hash(&mut hasher);
     }
-    let heard = (dive.readings(), dive.health().collect::<Vec<_>>(), dive.vehicle(), dive.tally());
-    let told = (dive.notices(), dive.live_state(), dive.alerts());
-    let console = dive.console_counts();
+    let heard = (dive.view().readings(), dive.view().health(), dive.view().vehicle(), dive.view().tally());
+    let told = (dive.view().notices().collect::<Vec<_>>(), dive.view().live_state(), dive.view().alerts());
+    let console = dive.view().console_counts();
     (dive.ticks(), dive.now().0, format!("{heard:?} {told:?} {console:?}")).hash(&mut hasher);
     hasher.finish()
 }
@@ -193,25 +197,24 @@ fn panicking_thread_is_an_error_and_never_blocks() {
 }
 
 /// An outlet that has a backlog at times and makes the loop hold packets back.
-struct Behind;
-
-#[derive(Resource, Default)]
-struct Held(u64);
+#[derive(Clone, Default)]
+struct Behind(Arc<AtomicU64>);
 
 impl Plugin for Behind {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.insert_resource(Held::default());
-        app.add_systems(Stage::Publish, hold_back);
+        app.add_outlet(self.clone());
         Ok(())
     }
 }
 
-fn hold_back(mut inbox: ResMut<'_, Inbox>, mut held: ResMut<'_, Held>) {
-    held.0 += 1;
-    inbox.allowance_bytes = if held.0.is_multiple_of(16) { 0 } else { MAX_TICK_BYTES };
+impl Outlet for Behind {
+    fn publish(&mut self, _: &DiveView<'_>) -> usize {
+        let ticks = self.0.fetch_add(1, Ordering::Relaxed) + 1;
+        if ticks.is_multiple_of(16) { 0 } else { MAX_TICK_BYTES }
+    }
 }
 
-/// A plugin with a system in the stage that places pings.
+/// A plugin with a system in the placer.
 struct Placing;
 
 #[derive(Resource, Default)]
@@ -219,8 +222,8 @@ struct Seen(usize);
 
 impl Plugin for Placing {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.insert_resource(Seen::default());
-        app.add_systems_after(Stage::Decode, see);
+        app.placer.insert_resource(Seen::default());
+        app.placer.add_systems_after(PlaceStage::Decode, see);
         Ok(())
     }
 }
@@ -242,11 +245,16 @@ fn loop_waits_for_slow_outlets_and_plugins_see_every_packet() {
             drive_on(threads, &mut dive, &mut feed, DurNs::from_millis(20), &mut |_| ()).unwrap();
             dive
         };
-        let mut dive = run(&Behind);
-        assert!(dive.resource::<Held>().unwrap().0 > 100);
+        let behind = Behind::default();
+        let mut dive = run(&behind);
+        assert!(behind.0.load(Ordering::Relaxed) > 100);
         let report = ended(&mut dive).0;
         assert_eq!((&report["digest"], &report["sources"]), (&expected["digest"], &expected["sources"]));
-        assert_eq!(run(&Placing).resource::<Seen>().unwrap().0, packets.len(), "{threads} threads");
+        assert_eq!(
+            run(&Placing).placer().unwrap().resource::<Seen>().unwrap().0,
+            packets.len(),
+            "{threads} threads"
+        );
     }
 }
 
@@ -256,10 +264,10 @@ fn split_loop_cannot_be_saved_or_split_again() {
     let scene = scene();
     let mut dive = armed(&scene.vehicle, None);
     let saved = dive.save().unwrap();
-    let (placer, advising) = dive.split().unwrap();
+    let (placer, adviser) = dive.split().unwrap();
     assert!(dive.is_split() && dive.split().is_none());
     assert!(dive.save().is_err() && dive.restore(&saved).is_err());
-    dive.join(placer, advising);
+    dive.join(placer, adviser);
     assert!(!dive.is_split() && dive.save().unwrap() == saved);
     dive.restore(&saved).unwrap();
 }

@@ -92,7 +92,7 @@ fn exactly_the_packets_without_room_are_counted() {
         std::thread::sleep(Duration::from_millis(1));
     }
     let mut taken = 0;
-    let lines = supervisor.stop(&mut dive, &mut |dive| taken = dive.tally().packets);
+    let lines = supervisor.stop(&mut dive, &mut |dive| taken = dive.view().placed().packets());
     let heard = count.load(Ordering::Acquire);
     assert!((1..=4).contains(&taken), "{taken} packets of 1000 bytes in a ring for 4096");
     assert_eq!(lines[0].dropped + taken, heard, "{:?}", lines[0]);

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::App;
-use headrace_monitor::outlet::NoticeOutlet;
+use headrace_monitor::notice_outlet::NoticeOutlet;
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 use headrace_sensor::device::Direction;

@@ -5,14 +5,14 @@ use super::{
     Priority, SILENCE,
 };
 use crate::console::Who;
-use crate::messages::{Notice, Notices};
+use crate::messages::Notice;
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::SourceId;
 
 /// Context for publishing changes.
 pub(crate) struct Telling<'a> {
-    pub(crate) notices: &'a mut Notices,
+    pub(crate) notices: &'a mut Vec<Notice>,
     pub(crate) stream: &'a mut ResultStream,
 }
 
@@ -22,8 +22,8 @@ impl Telling<'_> {
     /// The digest includes a notice even if the queue has no room for it.
     pub(super) fn tell(&mut self, alert: &ListedAlert, change: AlertChange, at: MonoNs) {
         digest(self.stream, alert, change, at);
-        if self.notices.0.len() < self.notices.0.capacity() {
-            self.notices.0.push(Notice::Listed { change, at, alert: *alert });
+        if self.notices.len() < self.notices.capacity() {
+            self.notices.push(Notice::Listed { change, at, alert: *alert });
         }
     }
 }

@@ -1,6 +1,6 @@
 use super::conditions::Seen;
 use super::*;
-use crate::messages::Notices;
+use crate::messages::Notice;
 use crate::result_stream::ResultStream;
 use headrace_coverage::{RunChange, RunId};
 use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _};
@@ -10,7 +10,7 @@ use proptest::prelude::*;
 /// A list, and the context for its changes.
 struct Bench {
     list: AlertList,
-    notices: Notices,
+    notices: Vec<Notice>,
     stream: ResultStream,
 }
 
@@ -21,7 +21,7 @@ impl Bench {
         let timing = all.fold(AlertTiming::default(), |all, class| all.with(class, timing));
         Self {
             list: AlertList::new(timing, LimitsConfig::default(), 30_000),
-            notices: Notices(Vec::with_capacity(100_000)),
+            notices: Vec::with_capacity(100_000),
             stream: ResultStream::default(),
         }
     }
@@ -237,7 +237,7 @@ fn flickering_speed_raises_one_alert() {
         let seen = Seen::of(ListKind::TooFast, beat % 3 != 0, Figures::None);
         bench.with(|list, to| list.observe(MonoNs(beat * 200_000_000), &seen, to));
     }
-    assert_eq!((bench.list.raised(), bench.notices.0.len()), (1, 1));
+    assert_eq!((bench.list.raised(), bench.notices.len()), (1, 1));
     // Without hold time and dead band, the same speeds raise ten alerts a minute.
     let mut bench = Bench::new(0.0, 0.0);
     for beat in 0..300_u64 {

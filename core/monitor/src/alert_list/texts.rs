@@ -2,12 +2,12 @@
 //! tick.
 
 use super::{AlertState, Figures, ListKind, ListedAlert};
-use crate::app::SourceInfo;
 use crate::head_descriptions::HeadDescriptions;
 use crate::pilot_text::{
     actions_text, advice_text, alert_text, cause_text, clock_text, no_position_text, setting_text,
     speed_text, station,
 };
+use crate::source::SourceInfo;
 use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
 use headrace_coverage::{Sections, Stretch};
 use headrace_geometry::tunnel::Profile;

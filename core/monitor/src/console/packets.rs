@@ -44,9 +44,9 @@ pub(crate) struct ReceivedCommand {
 #[derive(Debug, Resource)]
 pub(crate) struct Commands(pub(crate) Vec<ReceivedCommand>);
 
-impl Commands {
+impl Default for Commands {
     /// Allocates: at startup, all memory of the list.
-    pub(crate) fn new() -> Self {
+    fn default() -> Self {
         Self(Vec::with_capacity(MOST_OF_TICK))
     }
 }

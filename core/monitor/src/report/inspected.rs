@@ -48,19 +48,19 @@ pub(super) fn way_report(coverage: &Coverage) -> CoverageExtentReport {
 }
 
 pub(super) fn not_inspected(dive: &Loop) -> Option<NotInspectedReport> {
-    let tally = dive.tally();
+    let tally = dive.view().tally();
     let pings = pings(tally);
     let share = if pings > 0 { tally.without_fix as f64 / pings as f64 } else { 0.0 };
     let reason = match share {
         _ if pings == 0 => "no_sonar",
         share if share >= 1.0 => "no_position",
-        _ if way_report(dive.coverage()).from_m.is_none() => "outside_tunnel",
+        _ if way_report(dive.view().coverage()).from_m.is_none() => "outside_tunnel",
         share if share > MOST => "mostly_no_position",
         _ => return None,
     };
     let most = NoFix::ALL.into_iter().zip(tally.lacking).filter(|(_, count)| *count > 0);
     let most = most.max_by_key(|(_, count)| *count).map(|(lacking, _)| lacking.as_str());
-    let silent = dive.sources().iter().zip(dive.health()).filter(|(_, health)| health.readings == 0);
+    let silent = dive.sources().iter().zip(dive.view().health()).filter(|(_, health)| health.readings == 0);
     Some(NotInspectedReport {
         reason,
         missing: most,

@@ -8,7 +8,6 @@ use super::alerts::Alert;
 use super::console::ConsoleCounts;
 use super::head_descriptions::HeadDescriptions;
 use super::other_targets::OtherTargetReport;
-use super::resources::{Coverage, Tally};
 use super::run::Loop;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
@@ -278,7 +277,7 @@ pub struct SettingReport {
 impl Report {
     /// Creates the report of a loop's results so far.
     pub fn of(dive: &Loop) -> Self {
-        let (coverage, tally, log) = (dive.coverage(), dive.tally(), dive.advice_log());
+        let (coverage, log) = (dive.view().coverage(), dive.advice_log());
         let sections = &coverage.sections;
         let of_the_way =
             || sections.sections_of(coverage.frontier.way()).filter_map(|k| Some((k, sections.get(k)?)));
@@ -286,12 +285,12 @@ impl Report {
             report_version: REPORT_VERSION,
             not_inspected: inspected::not_inspected(dive),
             log: None,
-            digest: format!("{:016x}", dive.digest()),
+            digest: format!("{:016x}", dive.view().digest()),
             target_m: sections.target_m(),
             section_m: sections.section_m(),
             confidence_sd: confidence(sections.confidence_sd()),
             coverage_extent: inspected::way_report(coverage),
-            dive: dive_report(coverage, tally, dive.sound_speeds_mps()),
+            dive: dive_report(dive),
             summary: summarise(sections.section_m(), of_the_way().map(|(_, section)| section)),
             sections: of_the_way()
                 .map(|(k, section)| sections::section_report(sections, k, section, dive))
@@ -303,12 +302,12 @@ impl Report {
             other_targets: Vec::new(),
             heads: dive.head_descriptions().clone(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
-            alerts: dive.alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
+            alerts: dive.view().alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
             alert_list: listed(dive),
-            alerts_dropped: dive.alert_list().dropped(),
-            notes: dive.notes().iter().map(NoteJson::from).collect(),
-            notes_dropped: dive.notes().dropped(),
-            console: console_report(dive.console_counts()),
+            alerts_dropped: dive.view().alert_list().dropped(),
+            notes: dive.view().notes().iter().map(NoteJson::from).collect(),
+            notes_dropped: dive.view().notes().dropped(),
+            console: console_report(dive.view().console_counts()),
             advice: log.entries.iter().map(advice::advice_report).collect(),
             advice_dropped: log.dropped,
             sources: sources::source_reports(dive),
@@ -354,9 +353,9 @@ impl SummaryReport {
 
 /// Alerts that the list still keeps, as of the end of the dive.
 fn listed(dive: &Loop) -> Vec<ListedAlertJson> {
-    let around = dive.surroundings();
-    let now = dive.tally().span.map_or(MonoNs(0), |(_, last)| last);
-    dive.alert_list().iter().map(|alert| alert.json(&around, now)).collect()
+    let around = dive.view().surroundings();
+    let now = dive.view().span().map_or(MonoNs(0), |(_, last)| last);
+    dive.view().alert_list().iter().map(|alert| alert.json(&around, now)).collect()
 }
 
 fn console_report(counts: ConsoleCounts) -> Option<ConsoleReport> {
@@ -369,10 +368,11 @@ fn confidence(confidence_sd: f64) -> u32 {
     u32::try_from(headrace_geometry::math::round_to_i64(confidence_sd)).unwrap_or(0)
 }
 
-fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveReport {
-    let [sound_speed_least_mps, sound_speed_most_mps] = sound_mps;
+fn dive_report(dive: &Loop) -> DiveReport {
+    let (coverage, tally) = (dive.view().coverage(), dive.view().tally());
+    let [sound_speed_least_mps, sound_speed_most_mps] = dive.sound_speeds_mps();
     let swept = coverage.frontier.swept();
-    let (first, last) = tally.span.unwrap_or((MonoNs(0), MonoNs(0)));
+    let (first, last) = dive.view().span().unwrap_or((MonoNs(0), MonoNs(0)));
     DiveReport {
         duration_s: last.since(first).as_secs_f64(),
         start_s: first.as_secs_f64(),

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::app::SourceInfo;
 use crate::pilot_text::CauseFigures;
 use crate::run::Loop;
+use crate::source::SourceInfo;
 use headrace_coverage::{Action, Again, Cause, Run, RunId, Runs, Sections, Verdict};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
@@ -71,7 +71,7 @@ pub struct ReturnReport {
 }
 
 pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
-    let (sections, profile) = (&dive.coverage().sections, &dive.mission().profile);
+    let (sections, profile) = (&dive.view().coverage().sections, &dive.mission().profile);
     let heads = head_ids(dive);
     let bounds = |run: &Run| (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
     (0..)

@@ -105,11 +105,11 @@ pub struct NavigationReport {
 }
 
 pub(super) fn source_reports(dive: &Loop) -> Vec<SourceReport> {
-    let end = dive.tally().span.map_or(MonoNs(0), |(_, last)| last);
+    let end = dive.view().span().map_or(MonoNs(0), |(_, last)| last);
     let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld()).zip(dive.decoder_clocks());
     dive.sources()
         .iter()
-        .zip(dive.health())
+        .zip(dive.view().health())
         .zip(decoders)
         .enumerate()
         .map(|(number, ((source, tally), ((counts, withheld), clock)))| {

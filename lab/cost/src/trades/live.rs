@@ -7,7 +7,6 @@ use headrace_config::Document;
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
-use headrace_monitor::messages::AdviceList;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
 use headrace_replay::drive::{Driver, Pace};
@@ -284,9 +283,7 @@ impl Ran {
         let mut feed = recorded.packets.feed();
         let (mut v_max_mps, mut ticks_s) = (Vec::new(), Vec::new());
         let mut note = |dive: &Loop| {
-            if let Some(advice) = dive.resource::<AdviceList>() {
-                v_max_mps.extend(advice.0.iter().map(|advice| advice.v_max_mps));
-            }
+            v_max_mps.extend(dive.advised().entries.iter().map(|entry| entry.advice.v_max_mps));
         };
         while driver.due(&mut feed).map_err(TruthError::from)?.is_some() {
             let (ticked, tick_s) = timed(|| driver.tick(&mut dive, &mut feed, &mut note));

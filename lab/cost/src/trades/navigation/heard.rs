@@ -8,7 +8,6 @@ use headrace_fusion::smooth::track::TrackNavigation;
 use headrace_fusion::smooth::two_filters::smoothable;
 use headrace_fusion::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::time::MonoNs;
-use headrace_monitor::messages::Events;
 use headrace_sensor::device::{SensorInfo, SensorSpec};
 use headrace_sensor::reading::{MAX_SOURCES, Reading};
 use headrace_vehicle::VehicleConfig;
@@ -44,8 +43,7 @@ impl Hearing {
         let mut readings: Vec<Heard> = Vec::new();
         let navigation = Box::new(CableNavigation::new(&vehicle.tunnel.profile));
         let dive = recorded.judged_with(vehicle, navigation, &mut |dive| {
-            let Some(events) = dive.resource::<Events>() else { return };
-            readings.extend(events.0.iter().map(|event| Heard {
+            readings.extend(dive.readings().iter().map(|event| Heard {
                 source: event.source.index(),
                 times: Times { received: event.received, valid: event.valid_at },
                 reading: event.reading,

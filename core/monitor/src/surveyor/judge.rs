@@ -1,59 +1,74 @@
-//! Judges a section: verdict, flag and run.
+//! Judges the sections that are due: verdict, flag and run.
 
-use super::alerting::RunInputs;
+use bevy_ecs::prelude::{Res, ResMut};
+
+use super::survey::{Cursor, OutputRefs, Outputs, Requests};
 use crate::alert_list::RunInput;
-use crate::alerts::{AlertKind, Alerts};
-use crate::messages::{Notice, Notices};
-use crate::resources::{Coverage, Digests, Finder};
-use crate::result_stream::RecordKind;
-use headrace_coverage::{Judging, Request, RunChange, RunId, Sections};
+use crate::alerts::AlertKind;
+use crate::messages::Notice;
+use crate::resources::{Coverage, Digests, Finder, TunnelDesign};
+use crate::result_stream::{RecordKind, ResultStream};
+use headrace_coverage::{Judging, Request, RunChange, RunId, Section, Sections};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::reading::SourceId;
 
-/// Working memory and outputs of judging, without the sections.
-pub(crate) struct Results<'a> {
-    pub(crate) finder: &'a mut Finder,
-    pub(crate) notices: &'a mut Notices,
-    pub(crate) digests: &'a mut Digests,
-    pub(crate) alerts: &'a mut Alerts,
-    pub(crate) runs: &'a mut RunInputs,
-    /// Index of the event at which the section is judged. The flag says whether it is judged at an update
-    /// before this event.
-    pub(crate) place: (usize, bool),
+pub(super) fn judge_due(
+    tunnel: Res<'_, TunnelDesign>,
+    cursor: Res<'_, Cursor>,
+    mut requests: ResMut<'_, Requests>,
+    mut coverage: ResMut<'_, Coverage>,
+    mut finder: ResMut<'_, Finder>,
+    mut outputs: Outputs<'_>,
+) {
+    for request in requests.0.drain(..) {
+        judge_one(&request, (&tunnel.profile, cursor.stop), &mut coverage, &mut finder, &mut outputs.refs());
+    }
 }
 
 /// Judges one section and publishes the changes.
-pub(crate) fn judge_one(
+fn judge_one(
     request: &Request,
-    profile: &Profile,
+    (profile, stop): (&Profile, (usize, bool)),
     coverage: &mut Coverage,
-    results: &mut Results<'_>,
+    finder: &mut Finder,
+    outputs: &mut OutputRefs<'_>,
 ) {
     let Coverage { store, sections, unsure, lacks, .. } = coverage;
-    let Results { finder, notices, digests, alerts, runs, place } = results;
-    let begun = notices.0.len();
+    let OutputRefs { notices, runs, digests, alerts } = outputs;
+    let begun = notices.len();
     let mut tell = |id: RunId, change: RunChange| {
-        notices.0.push(Notice::Run { id, at: request.at, change });
+        notices.push(Notice::Run { id, at: request.at, change });
         digests.judgements.record(RecordKind::Run).integer(u64::from(id.0)).integer(change as u64);
     };
     let mut judging = Judging { store, lacks, finder: &mut finder.0, profile, tell: &mut tell };
     let change = sections.judge(request, &mut judging);
-    note_runs(notices.0.get(begun..).unwrap_or_default(), *place, sections, runs);
+    note_runs(notices.get(begun..).unwrap_or_default(), stop, sections, runs);
     let Some(change) = change else { return };
-    notices.0.push(Notice::Section { section: request.section, at: request.at, change });
+    notices.push(Notice::Section { section: request.section, at: request.at, change });
     if let Some(here) = sections.unsure(request.section)
         && !unsure.as_mut().is_some_and(|last| last.join(&here, sections.section_m()))
     {
         *unsure = Some(here);
     }
     let Some(section) = sections.get(request.section) else { return };
-    digests
-        .judgements
+    digest(&mut digests.judgements, request, change as u64, section);
+    if section.contradicts() {
+        let off_m = section.deviation.mean_m().unwrap_or(0.0);
+        let x_m = sections.bounds_m(request.section).0;
+        if alerts.note(AlertKind::ProfileContradicted, request.at, x_m, off_m) {
+            notices.push(Notice::Alert(AlertKind::ProfileContradicted, None));
+            digest_alert(digests, AlertKind::ProfileContradicted, None, request.at, (x_m, off_m));
+        }
+    }
+}
+
+fn digest(judgements: &mut ResultStream, request: &Request, change: u64, section: &Section) {
+    judgements
         .record(RecordKind::Section)
         .integer(request.at.0)
         .integer(request.section as u64)
-        .integer(change as u64)
+        .integer(change)
         .integer(section.verdict as u64)
         .number(section.hole.map_or(0.0, |hole| hole.diameter_m))
         .number(section.hole_sd_m)
@@ -61,8 +76,7 @@ pub(crate) fn judge_one(
         .number(section.hole.map_or(0.0, |hole| hole.x_m))
         .number(section.hole.map_or(0.0, |hole| hole.arc_m));
     if let Some(evidence) = section.evidence {
-        digests
-            .judgements
+        judgements
             .number(evidence.speed_mps)
             .number(evidence.t_y_m)
             .number(evidence.middle_t_y_m)
@@ -72,26 +86,18 @@ pub(crate) fn judge_one(
             .integer(u64::from(evidence.causes.bits()))
             .number(evidence.with_losses_mps);
     }
-    if section.contradicts() {
-        let off_m = section.deviation.mean_m().unwrap_or(0.0);
-        let x_m = sections.bounds_m(request.section).0;
-        if alerts.note(AlertKind::ProfileContradicted, request.at, x_m, off_m) {
-            notices.0.push(Notice::Alert(AlertKind::ProfileContradicted, None));
-            digest_alert(digests, AlertKind::ProfileContradicted, None, request.at, (x_m, off_m));
-        }
-    }
 }
 
 /// Records changed runs for the list of alerts.
 ///
 /// Cleared runs come last. The alert of a cleared run passes to the runs that remain of it, so the list must
 /// have these runs first.
-fn note_runs(notices: &[Notice], place: (usize, bool), sections: &Sections, runs: &mut RunInputs) {
+fn note_runs(notices: &[Notice], stop: (usize, bool), sections: &Sections, runs: &mut Vec<RunInput>) {
     for cleared in [false, true] {
         for notice in notices {
             let Notice::Run { id, at, change } = *notice else { continue };
-            if (change == RunChange::Cleared) == cleared && runs.0.len() < runs.0.capacity() {
-                runs.0.extend(RunInput::of(place, at, (id, change), sections));
+            if (change == RunChange::Cleared) == cleared && runs.len() < runs.capacity() {
+                runs.extend(RunInput::of(stop, at, (id, change), sections));
             }
         }
     }
@@ -115,6 +121,7 @@ pub(crate) fn digest_alert(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::alerts::Alerts;
     use crate::fixtures::{coverage, pipe};
     use headrace_coverage::{Judgement, Reach, Unsure};
 
@@ -134,17 +141,15 @@ mod tests {
             ended: None,
             only_fails: false,
         };
-        let (mut notices, mut runs) = (Notices(Vec::new()), RunInputs(Vec::with_capacity(8)));
-        let mut results = Results {
-            finder: &mut Finder::default(),
+        let (mut notices, mut runs) = (Vec::new(), Vec::with_capacity(8));
+        let mut outputs = OutputRefs {
             notices: &mut notices,
+            runs: &mut runs,
             digests: &mut Digests::default(),
             alerts: &mut Alerts::default(),
-            runs: &mut runs,
-            place: (3, true),
         };
-        judge_one(&request, &pipe(), coverage, &mut results);
-        (notices.0, runs.0)
+        judge_one(&request, (&pipe(), (3, true)), coverage, &mut Finder::default(), &mut outputs);
+        (notices, runs)
     }
 
     #[test]
@@ -185,10 +190,10 @@ mod tests {
             run(2, RunChange::Changed),
         ];
         for (room, expected) in [(8, vec![1, 2, 0]), (2, vec![1, 2])] {
-            let mut runs = RunInputs(Vec::with_capacity(room));
+            let mut runs = Vec::with_capacity(room);
             note_runs(&notices, (5, false), &coverage.sections, &mut runs);
-            assert_eq!(runs.0.iter().map(|run| run.id.0).collect::<Vec<_>>(), expected);
-            assert!(runs.0.iter().all(|run| (run.event, run.at_beat, run.at) == (5, false, AT)));
+            assert_eq!(runs.iter().map(|run| run.id.0).collect::<Vec<_>>(), expected);
+            assert!(runs.iter().all(|run| (run.event, run.at_beat, run.at) == (5, false, AT)));
         }
     }
 }

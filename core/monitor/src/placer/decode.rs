@@ -1,35 +1,42 @@
 //! Converts bytes to readings.
 
-use bevy_ecs::prelude::{Query, Res, ResMut};
+use bevy_ecs::prelude::{Query, Res, ResMut, Resource};
+use bevy_ecs::system::SystemParam;
 
 use super::sound_speed::SoundSpeed;
 use crate::console::{Commands, Console};
-use crate::entities::{SensorDecoder, SensorHealth, widened};
+use crate::entities::{SensorDecoder, SensorHealth, VehicleEntities};
 use crate::merge::Inbox;
-use crate::messages::{Event, Events};
-use crate::resources::{Tally, VehicleEntities};
+use crate::messages::Event;
 
-#[expect(clippy::too_many_arguments, reason = "a system's arguments are its inputs and outputs")]
+/// Readings of this tick, in order.
+#[derive(Debug, Default, Resource)]
+pub(super) struct Events(pub(super) Vec<Event>);
+
+/// The operator's input.
+#[derive(SystemParam)]
+pub(super) struct Operator<'w> {
+    console: ResMut<'w, Console>,
+    commands: ResMut<'w, Commands>,
+}
+
 pub(super) fn decode(
     inbox: Res<'_, Inbox>,
     entities: Res<'_, VehicleEntities>,
     mut sensors: Query<'_, '_, (&mut SensorDecoder, &mut SensorHealth)>,
-    mut events: ResMut<'_, Events>,
-    mut tally: ResMut<'_, Tally>,
     mut sound_speed: ResMut<'_, SoundSpeed>,
-    mut console: ResMut<'_, Console>,
-    mut commands: ResMut<'_, Commands>,
+    mut events: ResMut<'_, Events>,
+    mut operator: Operator<'_>,
 ) {
     events.0.clear();
-    commands.0.clear();
+    operator.commands.0.clear();
     for (source, packet) in inbox.iter() {
         // The console isn't a sensor, so it doesn't contribute to the dive's times and counts.
+        let Operator { console, commands } = &mut operator;
         if source == console.source {
-            console.take(packet, events.0.len(), &mut commands);
+            console.take(packet, events.0.len(), commands);
             continue;
         }
-        tally.packets += 1;
-        tally.span = Some(widened(tally.span, packet.received));
         let before = events.0.len();
         let sensor = entities.of_source(source).and_then(|entity| sensors.get_mut(entity).ok());
         let Some((mut decoder, mut health)) = sensor else { continue };

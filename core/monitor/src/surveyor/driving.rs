@@ -1,7 +1,7 @@
 //! Driving figures of the vehicle and its heads at each update. They are stored with the passage of each
 //! section.
 
-use bevy_ecs::prelude::Component;
+use bevy_ecs::prelude::Resource;
 
 use super::missing_samples::MissingSampleFinder;
 use headrace_coverage::{Drive, OtherSettings};
@@ -51,7 +51,7 @@ pub(super) struct Plan {
 }
 
 /// Driving figures at the last update, and the earlier data needed for them.
-#[derive(Debug, Clone, Default, Component)]
+#[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Driving {
     pub(super) now: Drive,
     /// Step of the heads, radians, and the place in the cross-section, m, for which the steps along the wall

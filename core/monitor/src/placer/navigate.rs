@@ -1,15 +1,45 @@
 //! Converts readings to fixes.
 
-use bevy_ecs::prelude::{Query, Res, ResMut, Single};
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::{Query, Res, ResMut, Resource, Single};
 
+use super::decode::Events;
 use crate::advice_log::ADVICE_PERIOD;
-use crate::entities::{Mounted, Navigator, VehicleState};
-use crate::messages::{Doubts, Event, Events, Positioned, PositionedList};
-use crate::resources::{Digests, VehicleEntities};
+use crate::entities::{Mounted, Navigator, VehicleEntities, VehicleState};
+use crate::messages::{Doubts, Event};
 use crate::result_stream::{RecordKind, ResultStream};
-use headrace_fusion::Times;
+use headrace_fusion::filter::pose_sd::PoseSd;
+use headrace_fusion::{Fix, NoFix, Times};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::Reading;
+
+/// A multiple of [`ADVICE_PERIOD`], or a sonar ping, with its fix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Positioned {
+    /// A sonar ping. The fix is for the ping's time of validity.
+    Ping { event: usize, sensor: Entity, fix: Result<Fix, NoFix> },
+    /// A multiple of the advice period has passed. `before` is the index of the next event.
+    Beat { at: MonoNs, fix: Result<Fix, NoFix>, doubts: Doubts, sd: Option<PoseSd>, before: usize },
+}
+
+/// Pings and updates of this tick with their fixes, in order.
+#[derive(Debug, Resource)]
+pub(super) struct PositionedList(pub(super) Vec<Positioned>);
+
+/// Poses at the updates.
+#[derive(Debug, Default, Resource)]
+pub(crate) struct Poses(pub(crate) ResultStream);
+
+impl Stateful for Poses {
+    fn save(&self, to: &mut Saver) {
+        self.0.save(to);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.0.restore(from)
+    }
+}
 
 pub(super) fn navigate(
     events: Res<'_, Events>,
@@ -17,7 +47,7 @@ pub(super) fn navigate(
     sensors: Query<'_, '_, &Mounted>,
     vehicle: Single<'_, '_, (&mut Navigator, &mut VehicleState)>,
     mut list: ResMut<'_, PositionedList>,
-    mut digests: ResMut<'_, Digests>,
+    mut poses: ResMut<'_, Poses>,
 ) {
     list.0.clear();
     let (mut navigator, mut state) = vehicle.into_inner();
@@ -32,19 +62,20 @@ pub(super) fn navigate(
             let doubts = Doubts { cable, setting, stand_s: navigation.stand_s(), hung: navigator.hung };
             let sd = navigation.pose_sd();
             *state = VehicleState { at: Some(at), fix, sd, cable_doubt: doubts.cable };
-            digest(&mut digests.poses, at, &state);
+            digest(&mut poses.0, at, &state);
             list.0.push(Positioned::Beat { at, fix, doubts, sd, before: index });
         }
-        if matches!(event.reading, Reading::Sonar(_)) {
+        let sensor = entities.of_source(event.source);
+        if let (Reading::Sonar(_), Some(sensor)) = (&event.reading, sensor) {
             let fix = navigator.navigation.fix(event.valid_at);
-            list.0.push(Positioned::Ping { event: index, fix });
+            list.0.push(Positioned::Ping { event: index, sensor, fix });
         }
-        if let Some(sensor) = entities.of_source(event.source).and_then(|entity| sensors.get(entity).ok()) {
+        if let Some(mounted) = sensor.and_then(|sensor| sensors.get(sensor).ok()) {
             if navigator.hangs(event) {
                 continue;
             }
             let times = Times { received: event.received, valid: event.valid_at };
-            navigator.navigation.update(event.source.index(), &sensor.info, times, &event.reading);
+            navigator.navigation.update(event.source.index(), &mounted.info, times, &event.reading);
         }
     }
 }

@@ -3,25 +3,13 @@
 //!
 //! If no head pings, sections that the vehicle has left are judged here.
 
-use bevy_ecs::prelude::Query;
-
-use super::georeference::reach;
+use super::heads::Heads;
+use super::survey::Requests;
 use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
-use crate::messages::Requests;
 use crate::resources::{Coverage, TunnelDesign};
 use headrace_coverage::{HeadReach, Reach};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::passes::Situation;
-
-/// A head: number, mount, hidden angles, sweep and reach.
-pub(super) type Heads<'w, 's> = Query<'w, 's, HeadParts>;
-type HeadParts = (
-    &'static Head,
-    &'static Mounted,
-    &'static HiddenAngles,
-    &'static mut HeadSweep,
-    &'static mut HeadFrontier,
-);
 
 /// Extends the coverage extent at an update with a fix.
 ///
@@ -37,7 +25,7 @@ pub(super) fn note_beat(
     let mut all: Option<Reach> = None;
     let mut span = Reach { from_m: pose.position.x(), to_m: pose.position.x() };
     for (head, mounted, .., mut frontier) in heads.iter_mut() {
-        let here = reach(&pose, &mounted.info.mount, tunnel);
+        let here = tunnel.reach(&pose, &mounted.info.mount);
         all = Some(all.map_or(here, |all| all.with(here)));
         span = span.with(Reach { from_m: here.middle_m(), to_m: here.middle_m() });
         if coverage.frontier.is_silent(frontier.0.as_ref(), at) {

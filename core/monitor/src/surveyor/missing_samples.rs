@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::coverage_extent::Heads;
+use super::heads::Heads;
 use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
 use crate::resources::Coverage;
 use headrace_coverage::{Cause, Causes, Drive, Loss, MissingSample, MissingSamples};

@@ -1,152 +1,112 @@
-//! Outlier filter: returns accepted as wall become samples, doubtful ones are counted and recorded.
+//! Returns classified as wall become samples, doubtful ones are counted and recorded.
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::World;
 
+use super::classify::Class;
 use super::judge::digest_alert;
 use super::missing_samples::number_of;
 use super::samples::note_sample;
-use crate::alerts::{AlertKind, Alerts};
-use crate::entities::{HeadSweep, Waiting};
-use crate::messages::{Aim, Hidden, Notice, Notices, Outcome, PlacedPing, Requests};
-use crate::resources::{Coverage, Digests, Tally, TunnelDesign, VehicleEntities};
+use super::survey::{OutputRefs, Outputs};
+use crate::alerts::AlertKind;
+use crate::entities::{HeadClassifier, HeadEntities, HeadSweep, Waiting};
+use crate::messages::{Aim, Hidden, Notice, Outcome, PlacedPing};
+use crate::resources::{Coverage, Digests, Tally, TunnelDesign};
 use crate::result_stream::RecordKind;
-use headrace_coverage::deviation::off_m;
-use headrace_coverage::{
-    Beam, Cause, Causes, Loss, MissingSample, Outlook, PlacedReturn, Request, StoreError, Taken,
-};
+use headrace_coverage::{Cause, Causes, Loss, MissingSample, StoreError, Taken};
 use headrace_geometry::frames::{Point3, Tunnel};
-use headrace_geometry::math;
 
 /// Distance beyond either end of the tunnel from which samples raise an alert, m.
 const WELL_BEYOND_M: f64 = 1.0;
 
-/// Inputs and outputs of the filter, without the head.
-pub(super) struct FilterContext<'a> {
+/// Inputs and outputs, without the head.
+pub(super) struct WallContext<'a> {
     pub(super) coverage: &'a mut Coverage,
     pub(super) tunnel: &'a TunnelDesign,
     pub(super) tally: &'a mut Tally,
-    pub(super) notices: &'a mut Notices,
-    pub(super) digests: &'a mut Digests,
-    pub(super) alerts: &'a mut Alerts,
+    pub(super) outputs: OutputRefs<'a>,
 }
 
-/// Filters a ping's return, and the returns that waited for this ping. A ping without a return breaks the
-/// sweep.
+/// Applies a ping's classified return, and the returns that waited for this ping. A ping without a return
+/// breaks the sweep.
 ///
 /// If the head has just become distrusted, returns the chainages of its samples, m.
 pub(super) fn note_ping(
-    sorting: &mut FilterContext<'_>,
+    context: &mut WallContext<'_>,
     sweep: &mut HeadSweep,
-    ping: &PlacedPing,
+    (ping, class): (&PlacedPing, &Class),
 ) -> Option<[f64; 2]> {
-    let (Outcome::Sample { point, arc_m }, Some(origin)) = (ping.outcome, ping.origin) else {
-        digest(sorting.digests, ping, RecordKind::NoSample);
+    let (Outcome::Sample { point, .. }, Class::Return(sorted, is_distrusted)) = (ping.outcome, class) else {
+        digest(context.outputs.digests, ping, RecordKind::NoSample);
         if let Some(waiting) = sweep.waiting.last_mut() {
             waiting.broken = true;
             waiting.new_sweep |= ping.new_sweep;
         } else {
-            store(sorting, sweep, ping);
+            store(context, sweep, ping);
         }
         return None;
     };
-    let profile = &sorting.tunnel.profile;
-    let (from, to) = ([origin.y(), origin.z()], [point.y(), point.z()]);
-    let beam = [to[0] - from[0], to[1] - from[1]];
-    let range_m = math::hypot(beam[0], beam[1]);
-    let placed = PlacedReturn { x_m: point.x(), arc_m, off_m: off_m(profile, to, arc_m) };
-    let had = Beam {
-        range_m,
-        angle_rad: math::atan2(beam[0], -beam[1]),
-        standing: ping.standing,
-        design_range_m: &|| {
-            let beam = (range_m > 0.0).then(|| beam.map(|of| of / range_m))?;
-            Some(profile.cast(from, beam)?.range_m)
-        },
-    };
-    let relief = &mut sorting.coverage.relief;
-    let sorted = sweep.wall.sort(ping.head, placed, &had, &sorting.tunnel.limits, relief);
     if let Some(taken) = sorted.waiting {
         for waiting in sweep.waiting.take() {
-            settle(sorting, sweep, &waiting, taken == Taken::Wall);
+            settle(context, sweep, &waiting, (taken == Taken::Wall, *is_distrusted));
         }
     }
     match sorted.this {
-        Taken::Wall => wall(sorting, sweep, ping),
+        Taken::Wall => wall(context, sweep, ping),
         Taken::Waits if sweep.waiting.add(ping) => {}
-        Taken::Waits | Taken::Doubtful => doubtful(sorting, sweep, ping),
+        Taken::Waits | Taken::Doubtful => doubtful(context, sweep, ping, *is_distrusted),
     }
     let (why, between_m) = sorted.distrusted?;
     let (kind, figure_m) = AlertKind::of_distrust(why);
     let source = Some(ping.source);
-    if sorting.alerts.note_of(source, kind, ping.received, point.x(), figure_m) {
-        sorting.notices.0.push(Notice::Alert(kind, source));
-        digest_alert(sorting.digests, kind, source, ping.received, (point.x(), figure_m));
+    let OutputRefs { notices, digests, alerts, .. } = &mut context.outputs;
+    if alerts.note_of(source, kind, ping.received, point.x(), figure_m) {
+        notices.push(Notice::Alert(kind, source));
+        digest_alert(digests, kind, source, ping.received, (point.x(), figure_m));
     }
     Some(between_m)
 }
 
-/// Inputs and outputs of the filter at the end of a dive.
+/// Inputs and outputs at the end of a dive.
 type End<'w, 's> = (
-    Query<'w, 's, &'static mut HeadSweep>,
+    Query<'w, 's, (&'static HeadClassifier, &'static mut HeadSweep)>,
+    Res<'w, HeadEntities>,
     ResMut<'w, Coverage>,
     Res<'w, TunnelDesign>,
     ResMut<'w, Tally>,
-    ResMut<'w, Notices>,
-    ResMut<'w, Digests>,
-    ResMut<'w, Alerts>,
+    Outputs<'w>,
 );
 
-/// Classifies the returns that still wait at the end of a dive, when no more returns will come. Allocates:
-/// outside a tick only.
-pub(crate) fn end_returns(world: &mut World) {
-    let heads = world.resource::<VehicleEntities>().heads.clone();
+/// Applies the returns that still wait at the end of a dive, when no more returns will come, as doubtful.
+/// Allocates: outside a tick only.
+pub(super) fn end_returns(world: &mut World) {
     let mut state = SystemState::<End<'_, '_>>::new(world);
-    let Ok((mut sweeps, mut coverage, tunnel, mut tally, mut notices, mut digests, mut alerts)) =
-        state.get_mut(world)
+    let Ok((mut sweeps, entities, mut coverage, tunnel, mut tally, mut outputs)) = state.get_mut(world)
     else {
         return;
     };
-    let mut sorting = FilterContext {
-        coverage: &mut coverage,
-        tunnel: &tunnel,
-        tally: &mut tally,
-        notices: &mut notices,
-        digests: &mut digests,
-        alerts: &mut alerts,
-    };
-    for head in heads {
-        let Ok(mut sweep) = sweeps.get_mut(head) else { continue };
+    let outputs = outputs.refs();
+    let mut context = WallContext { coverage: &mut coverage, tunnel: &tunnel, tally: &mut tally, outputs };
+    for head in &entities.0 {
+        let Ok((classifier, mut sweep)) = sweeps.get_mut(*head) else { continue };
         for waiting in sweep.waiting.take() {
-            settle(&mut sorting, &mut sweep, &waiting, false);
-        }
-    }
-}
-
-/// Marks the sections that have samples of a distrusted head. Requests judging of those that have passed.
-pub(super) fn suspect(
-    coverage: &mut Coverage,
-    [from_m, to_m]: [f64; 2],
-    outlook: &Outlook,
-    requests: &mut Requests,
-) {
-    let sections = &mut coverage.sections;
-    for index in sections.index_of(from_m)..=sections.index_of(to_m) {
-        let Some(section) = sections.get_mut(index) else { continue };
-        section.suspect();
-        if section.hole.is_some() {
-            requests.0.push(Request::at(outlook)(index));
+            settle(&mut context, &mut sweep, &waiting, (false, classifier.0.distrusted().is_some()));
         }
     }
 }
 
 /// Applies a waiting return that has been classified, and then the pings since.
-fn settle(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, waiting: &Waiting, is_wall: bool) {
+fn settle(
+    context: &mut WallContext<'_>,
+    sweep: &mut HeadSweep,
+    waiting: &Waiting,
+    (is_wall, is_distrusted): (bool, bool),
+) {
     if is_wall {
-        wall(sorting, sweep, &waiting.ping);
+        wall(context, sweep, &waiting.ping);
     } else {
-        doubtful(sorting, sweep, &waiting.ping);
+        doubtful(context, sweep, &waiting.ping, is_distrusted);
     }
     if let Some(last) = &mut sweep.last {
         last.unbroken &= !waiting.broken;
@@ -156,39 +116,38 @@ fn settle(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, waiting: &Wait
     }
 }
 
-fn wall(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
-    sorting.tally.samples += 1;
-    digest(sorting.digests, ping, RecordKind::Sample);
-    if let Some(beyond_m) = beyond_end_m(ping, sorting.tunnel.length_m)
-        && sorting.alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
+fn wall(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    context.tally.samples += 1;
+    digest(context.outputs.digests, ping, RecordKind::Sample);
+    if let Some(beyond_m) = beyond_end_m(ping, context.tunnel.length_m)
+        && context.outputs.alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
     {
-        sorting.notices.0.push(Notice::Alert(AlertKind::OutsideTunnel, None));
-        digest_alert(sorting.digests, AlertKind::OutsideTunnel, None, ping.received, beyond_m);
+        context.outputs.notices.push(Notice::Alert(AlertKind::OutsideTunnel, None));
+        digest_alert(context.outputs.digests, AlertKind::OutsideTunnel, None, ping.received, beyond_m);
     }
-    store(sorting, sweep, ping);
+    store(context, sweep, ping);
 }
 
 /// Stores a ping's sample. Without a sample the sweep is broken.
-fn store(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
-    match note_sample(sorting.coverage, sweep, sorting.tunnel, ping) {
+fn store(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    match note_sample(context.coverage, sweep, context.tunnel, ping) {
         Ok(()) => {}
-        Err(StoreError::Outside) => sorting.tally.outside += 1,
-        Err(StoreError::Full) => sorting.tally.not_stored += 1,
+        Err(StoreError::Outside) => context.tally.outside += 1,
+        Err(StoreError::Full) => context.tally.not_stored += 1,
     }
 }
 
 /// Counts a doubtful return. For holes and causes it is a missing return, aimed at the point where its beam
 /// meets the design.
-fn doubtful(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
-    sorting.tally.doubtful += 1;
-    digest(sorting.digests, ping, RecordKind::Doubtful);
+fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing, is_distrusted: bool) {
+    context.tally.doubtful += 1;
+    digest(context.outputs.digests, ping, RecordKind::Doubtful);
     let Outcome::Sample { point, .. } = ping.outcome else { return };
-    let aim = ping.origin.and_then(|origin| aim(sorting.tunnel, &origin, &point));
+    let aim = ping.origin.and_then(|origin| aim(context.tunnel, &origin, &point));
     let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
-    store(sorting, sweep, &lost);
-    let Coverage { lacks, sections, .. } = &mut *sorting.coverage;
+    store(context, sweep, &lost);
+    let Coverage { lacks, sections, .. } = &mut *context.coverage;
     // A head whose returns are all rejected counts as silent.
-    let is_distrusted = sweep.wall.distrusted().is_some();
     if let Some(reach) = ping.reach
         && let Some(section) = sections.get_mut(sections.index_of(reach.middle_m()))
     {
@@ -247,18 +206,22 @@ fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::classify::classify;
+    use super::super::survey::Found;
     use super::*;
+    use crate::alerts::Alerts;
     use crate::fixtures::{coverage, heard, pinged, tunnel};
-    use bevy_ecs::world::World;
-    use headrace_coverage::{Frontier, SampleStore, StoreLayout};
-    use headrace_geometry::time::MonoNs;
+    use headrace_coverage::{HeadWall, Relief, SampleStore, StoreLayout};
 
     struct Bench {
         coverage: Coverage,
         tunnel: TunnelDesign,
         tally: Tally,
-        notices: Notices,
+        notices: Vec<Notice>,
         alerts: Alerts,
+        digests: Digests,
+        head: HeadWall,
+        relief: Relief,
         sweep: HeadSweep,
     }
 
@@ -268,23 +231,28 @@ mod tests {
                 coverage: coverage(),
                 tunnel: tunnel(),
                 tally: Tally::default(),
-                notices: Notices(Vec::new()),
+                notices: Vec::new(),
                 alerts: Alerts::default(),
+                digests: Digests::default(),
+                head: HeadWall::default(),
+                relief: Relief::default(),
                 sweep: HeadSweep::default(),
             }
         }
 
-        /// Filters a ping. Returns the number of samples and the number of doubtful returns so far.
+        /// Classifies and applies a ping. Returns the number of samples and the number of doubtful returns so
+        /// far.
         fn note(&mut self, ping: &PlacedPing) -> (u64, u64) {
-            let mut sorting = FilterContext {
-                coverage: &mut self.coverage,
-                tunnel: &self.tunnel,
-                tally: &mut self.tally,
+            let class = classify(&mut self.head, ping, &self.tunnel, &mut self.relief);
+            let outputs = OutputRefs {
                 notices: &mut self.notices,
-                digests: &mut Digests::default(),
+                runs: &mut Vec::new(),
+                digests: &mut self.digests,
                 alerts: &mut self.alerts,
             };
-            assert_eq!(note_ping(&mut sorting, &mut self.sweep, ping), None);
+            let (coverage, tally) = (&mut self.coverage, &mut self.tally);
+            let mut context = WallContext { coverage, tunnel: &self.tunnel, tally, outputs };
+            assert_eq!(note_ping(&mut context, &mut self.sweep, (ping, &class)), None);
             (self.tally.samples, self.tally.doubtful)
         }
 
@@ -385,18 +353,9 @@ mod tests {
     #[test]
     fn digest_includes_the_place_of_a_sample() {
         let digest = |x_m: f64| {
-            let (mut bench, mut digests) = (Bench::new(), Digests::default());
-            let mut sorting = FilterContext {
-                coverage: &mut bench.coverage,
-                tunnel: &bench.tunnel,
-                tally: &mut bench.tally,
-                notices: &mut bench.notices,
-                digests: &mut digests,
-                alerts: &mut bench.alerts,
-            };
-            note_ping(&mut sorting, &mut bench.sweep, &heard(x_m, 1.0, 3.0));
-            assert_eq!(bench.tally.samples, 1);
-            digests.pings.value()
+            let mut bench = Bench::new();
+            assert_eq!(bench.note(&heard(x_m, 1.0, 3.0)), (1, 0));
+            bench.digests.pings.value()
         };
         let none = Digests::default().pings.value();
         assert!(digest(5.1) != none && digest(5.1) == digest(5.1) && digest(5.1) != digest(5.2));
@@ -408,7 +367,7 @@ mod tests {
         let mut note = |x_m: f64| {
             bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });
             let alert = bench.alerts.get(AlertKind::OutsideTunnel, None).copied();
-            (alert.map(|alert| alert.worst_m), bench.notices.0.len())
+            (alert.map(|alert| alert.worst_m), bench.notices.len())
         };
         assert_eq!(note(29.9), (None, 0));
         assert_eq!(note(30.9), (None, 0), "heads reach beyond the end");
@@ -421,44 +380,19 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.outside), (5, 1), "beyond the store");
     }
 
-    /// Sections with samples of a distrusted head are judged again if they were judged before.
-    #[test]
-    fn judged_sections_with_samples_of_a_distrusted_head_are_judged_again() {
-        let mut coverage = coverage();
-        let hole = headrace_coverage::Hole {
-            diameter_m: 0.3,
-            least_m: 0.3,
-            most_m: 0.3,
-            x_m: 5.1,
-            arc_m: 1.0,
-            bounded: true,
-        };
-        for index in [19, 21, 23] {
-            coverage.sections.get_mut(index).unwrap().hole = Some(hole);
-        }
-        let outlook = Frontier::default().outlook(core::iter::empty(), MonoNs(7));
-        let mut requests = Requests(Vec::new());
-        suspect(&mut coverage, [5.1, 5.8], &outlook, &mut requests);
-        let suspects = (0..40).filter(|index| coverage.sections.get(*index).unwrap().suspect);
-        assert_eq!(suspects.collect::<Vec<_>>(), [20, 21, 22, 23]);
-        let asked = requests.0.iter().map(|request| (request.section, request.at, request.only_fails));
-        assert_eq!(asked.collect::<Vec<_>>(), [(21, MonoNs(7), false), (23, MonoNs(7), false)]);
-    }
-
     #[test]
     fn undecided_return_at_the_end_of_a_dive_is_doubtful() {
         let mut bench = Bench::new();
         bench.note(&at(0, 3.0));
         bench.note(&at(1, 1.5));
         let mut world = World::new();
-        let head = world.spawn(bench.sweep).id();
-        let vehicle = world.spawn_empty().id();
-        world.insert_resource(VehicleEntities { vehicle, by_source: vec![head], heads: vec![head] });
+        let head = world.spawn((HeadClassifier(bench.head), bench.sweep)).id();
+        world.insert_resource(HeadEntities(vec![head]));
+        world.insert_resource(Found::with_room(0));
         world.insert_resource(bench.coverage);
         world.insert_resource(bench.tunnel);
         world.insert_resource(bench.tally);
-        world.insert_resource(bench.notices);
-        world.insert_resource(Digests::default());
+        world.insert_resource(bench.digests);
         world.insert_resource(bench.alerts);
         end_returns(&mut world);
         let tally = *world.resource::<Tally>();

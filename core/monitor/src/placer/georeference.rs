@@ -1,18 +1,18 @@
 //! Converts returns to points on the wall.
 
-use bevy_ecs::prelude::{Query, Res, ResMut};
+use bevy_ecs::prelude::{Query, Res, ResMut, Resource};
+use bevy_ecs::query::QueryItem;
 
+use super::decode::Events;
+use super::navigate::{Positioned, PositionedList};
 use crate::entities::{Head, HiddenAngles, LossCount, MeasuredMotion, Mounted};
 use crate::head_health::Heard;
-use crate::messages::{
-    Aim, Events, Hidden, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Positioned, PositionedList,
-};
-use crate::resources::{Target, TunnelDesign, VehicleEntities};
+use crate::messages::{Aim, Event, Hidden, Outcome, PlacedItem, PlacedPing, Placement, Update};
+use crate::resources::{Target, TunnelDesign};
 use headrace_coverage::deviation::off_m;
-use headrace_coverage::{Loss, PassError, Reach};
+use headrace_coverage::{Loss, PassError};
 use headrace_fusion::{Fix, NoFix};
-use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
-use headrace_geometry::math;
+use headrace_geometry::frames::{Mount, head_direction};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS, SILENT_AFTER};
 use headrace_sampling::losses::LossRate;
@@ -29,65 +29,74 @@ type HeadParts = (
     &'static HiddenAngles,
 );
 
-#[expect(clippy::too_many_arguments, reason = "a system's arguments are its inputs and outputs")]
+/// Pings and updates of this tick, in order.
+#[derive(Debug, Default, Resource)]
+pub(super) struct PlacedList(pub(super) Vec<PlacedItem>);
+
 pub(super) fn georeference(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,
     tunnel: Res<'_, TunnelDesign>,
     target: Res<'_, Target>,
-    entities: Res<'_, VehicleEntities>,
     mut heads: Heads<'_, '_>,
     mut placed: ResMut<'_, PlacedList>,
-    mut of_events: ResMut<'_, PlacedEvents>,
 ) {
     placed.0.clear();
-    of_events.0.clear();
     for item in &positioned.0 {
         match *item {
-            Positioned::Beat { at, fix, doubts, before, .. } => {
+            Positioned::Beat { at, fix, doubts, sd, before } => {
                 let situation = situation(at, fix, &tunnel, &target, &heads);
-                placed.0.push(Placed::Situation(at, situation, doubts));
-                of_events.0.push(before);
+                let placement = Placement::Update(Update { at, situation, doubts, fix, sd });
+                placed.0.push(PlacedItem { event: before, placement });
             }
-            Positioned::Ping { event: index, fix } => {
-                let Some(event) = events.0.get(index) else { continue };
+            Positioned::Ping { event: index, sensor, fix } => {
+                let (Some(event), Ok(head)) = (events.0.get(index), heads.get_mut(sensor)) else { continue };
                 let Reading::Sonar(sonar) = event.reading else { continue };
-                let head = entities.of_source(event.source).and_then(|entity| heads.get_mut(entity).ok());
-                let Some((head, mounted, mut motion, mut losses, hidden)) = head else { continue };
-                let turned = motion.ping(event.valid_at, sonar.angle_rad);
-                let mount = &mounted.info.mount;
-                let hides = hidden.hides(sonar.angle_rad);
-                let beside = [-BESIDE_RAD, BESIDE_RAD].iter().any(|by| hidden.hides(sonar.angle_rad + by));
-                let ping = PlacedPing {
-                    head: head.0,
-                    received: event.received,
-                    valid_at: event.valid_at,
-                    fix: fix.ok(),
-                    reach: fix.ok().map(|fix| reach(&fix.pose, mount, &tunnel)),
-                    single_step: turned.single_step,
-                    new_sweep: turned.new_sweep,
-                    standing: turned.standing,
-                    outcome: outcome(&sonar, fix, mount, hides, &tunnel),
-                    angle_rad: sonar.angle_rad,
-                    hidden: if hides {
-                        Hidden::Yes
-                    } else if beside {
-                        Hidden::Beside
-                    } else {
-                        Hidden::No
-                    },
-                    longest_m: longest_m(&sonar, &tunnel),
-                    source: event.source,
-                    origin: fix.ok().map(|fix| fix.pose.place(mount.position)),
-                };
-                if !ping.standing {
-                    count(&mut losses, &ping, sonar.range_m, &tunnel);
-                }
-                placed.0.push(Placed::Ping(ping));
-                of_events.0.push(index);
+                let placement = Placement::Ping(place(event, &sonar, fix, head, &tunnel));
+                placed.0.push(PlacedItem { event: index, placement });
             }
         }
     }
+}
+
+/// Places a head's ping.
+fn place(
+    event: &Event,
+    sonar: &SonarReturn,
+    fix: Result<Fix, NoFix>,
+    (head, mounted, mut motion, mut losses, hidden): QueryItem<'_, '_, HeadParts>,
+    tunnel: &TunnelDesign,
+) -> PlacedPing {
+    let turned = motion.ping(event.valid_at, sonar.angle_rad);
+    let mount = &mounted.info.mount;
+    let hides = hidden.hides(sonar.angle_rad);
+    let beside = [-BESIDE_RAD, BESIDE_RAD].iter().any(|by| hidden.hides(sonar.angle_rad + by));
+    let ping = PlacedPing {
+        head: head.0,
+        received: event.received,
+        valid_at: event.valid_at,
+        fix: fix.ok(),
+        reach: fix.ok().map(|fix| tunnel.reach(&fix.pose, mount)),
+        single_step: turned.single_step,
+        new_sweep: turned.new_sweep,
+        standing: turned.standing,
+        outcome: outcome(sonar, fix, mount, hides, tunnel),
+        angle_rad: sonar.angle_rad,
+        hidden: if hides {
+            Hidden::Yes
+        } else if beside {
+            Hidden::Beside
+        } else {
+            Hidden::No
+        },
+        longest_m: longest_m(sonar, tunnel),
+        source: event.source,
+        origin: fix.ok().map(|fix| fix.pose.place(mount.position)),
+    };
+    if !ping.standing {
+        count(&mut losses, &ping, sonar.range_m, tunnel);
+    }
+    ping
 }
 
 /// Counts a ping that was aimed at wall within range.
@@ -157,25 +166,6 @@ fn longest_m(sonar: &SonarReturn, tunnel: &TunnelDesign) -> f64 {
     tunnel.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps)
 }
 
-/// Chainages that a head reaches.
-///
-/// The samples lie in the plane across the head's axis. If the head is tilted, this plane extends over some
-/// chainage.
-pub(super) fn reach(pose: &Pose, mount: &Mount, tunnel: &TunnelDesign) -> Reach {
-    let origin = pose.place(mount.position);
-    let axis = pose.attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
-    let across = math::hypot(axis.y(), axis.z());
-    let spread_m = if across > 0.0 {
-        let leaning = [axis.y() / across, axis.z() / across];
-        let across = across.min(0.99);
-        let slope = across / math::sqrt(1.0 - across * across);
-        slope * tunnel.profile.farthest_along_m([origin.y(), origin.z()], leaning)
-    } else {
-        0.0
-    };
-    Reach { from_m: origin.x() - spread_m, to_m: origin.x() + spread_m }
-}
-
 fn situation(
     at: MonoNs,
     fix: Result<Fix, NoFix>,
@@ -230,7 +220,8 @@ mod tests {
     use bevy_ecs::world::World;
     use headrace_coverage::{OtherSettings, WallLimits};
     use headrace_fusion::relative::Relative;
-    use headrace_geometry::frames::{Point3, Rot};
+    use headrace_geometry::frames::{Point3, Pose, Rot, Vec3};
+    use headrace_geometry::math;
     use headrace_geometry::site::Site;
     use headrace_geometry::time::DurNs;
     use headrace_geometry::tunnel::shapes;

@@ -1,0 +1,334 @@
+//! The alerter: combines the values of the other parts and the operator's commands to the live state, alerts
+//! and notes.
+
+use super::adviser::Advised;
+use super::alert_list::{AlertList, Beat, MOST_LISTED, RunInput, Telling};
+use super::console::{Command, ReceivedCommand};
+use super::live_state::{LiveMetres, LiveState, PositionDoubt, PositionState, source_bits};
+use super::merge::MAX_TICK_PACKETS;
+use super::messages::{Event, Notice, PlacedItem, Placement, Standing, Update};
+use super::notes::{Note, Notes, Spoken};
+use super::placer::Placed;
+use super::result_stream::{RecordKind, ResultStream};
+use super::surveyor::Found;
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful as _};
+use headrace_geometry::time::MonoNs;
+use headrace_sampling::advice::Advice;
+use headrace_sampling::head::HeadSet;
+use headrace_sampling::passes::Situation;
+use headrace_sensor::reading::SourceId;
+
+/// Maximum share of the target for position errors for which the advice allows.
+const SPREAD_SHARE: f64 = 0.2;
+/// Notices per update: each alert may change several times.
+const NOTICES_PER_ALERT: usize = 4;
+
+/// Alerts, notes and the live state.
+pub struct Alerter {
+    pub(super) list: AlertList,
+    pub(super) notes: Notes,
+    pub(super) state: LiveState,
+    /// Number of commands without effect.
+    pub(super) without_effect: u64,
+    /// Live states at the updates.
+    pub(super) states: ResultStream,
+    /// Changes of alerts, and notes.
+    pub(super) changes: ResultStream,
+    /// Changes of alerts, and notes, of the last tick, in order.
+    pub(super) notices: Vec<Notice>,
+    /// Sources of the heads, by number.
+    heads: Vec<SourceId>,
+}
+
+impl Alerter {
+    /// Creates the alerter. `keeps_results` says whether its streams keep the words of each tick.
+    ///
+    /// `runs` is the maximum number of runs that change in a tick. Allocates: all memory.
+    pub(super) fn new(
+        list: AlertList,
+        state: LiveState,
+        heads: Vec<SourceId>,
+        runs: usize,
+        keeps_results: bool,
+    ) -> Self {
+        let (mut states, mut changes) = (ResultStream::default(), ResultStream::default());
+        if keeps_results {
+            states.keep();
+            changes.keep();
+        }
+        let notices = Vec::with_capacity(runs + MAX_TICK_PACKETS + NOTICES_PER_ALERT * MOST_LISTED);
+        Self { list, notes: Notes::default(), state, without_effect: 0, states, changes, notices, heads }
+    }
+
+    /// Clears the results of the last tick from the streams.
+    pub(super) fn next_tick(&mut self) {
+        self.states.next_tick();
+        self.changes.next_tick();
+    }
+
+    /// Takes what the other parts have made of a tick, which ends at `now`. Allocates: never.
+    pub(super) fn tick(&mut self, placed: &Placed, found: &Found, advised: &Advised, now: MonoNs) {
+        self.notices.clear();
+        let (runs, commands) = (&found.runs[..], &placed.commands.0[..]);
+        let mut inputs = Inputs { runs, commands, events: &placed.events, taken: (0, 0, 0) };
+        let mut results = advised.entries.iter().zip(&found.standings);
+        for PlacedItem { event, placement } in &placed.items {
+            let Placement::Update(update) = placement else { continue };
+            let Some((entry, standing)) = results.next() else { continue };
+            self.take_before(*event, &mut inputs);
+            self.update(update, &entry.advice, standing);
+        }
+        debug_assert!(results.next().is_none(), "each update has one advice and one standing");
+        self.take_rest(&mut inputs);
+        self.state.now = now;
+    }
+
+    /// Takes the runs that a judgement at the end of a dive has changed.
+    pub(super) fn take_runs_at_end(&mut self, runs: &[RunInput]) {
+        self.notices.clear();
+        runs.iter().for_each(|run| self.take_run(run));
+    }
+
+    fn update(&mut self, update: &Update, advice: &Advice, standing: &Standing) {
+        let Update { at, situation, doubts, fix, sd } = update;
+        let turning = (0..).zip(&situation.heads).filter(|(_, motion)| motion.is_some());
+        let turning = turning.fold(HeadSet::default(), |set, (head, _)| set.with(head));
+        let reserved_m = self.state.confidence_sd * situation.pass_error_m;
+        self.state = LiveState {
+            at: Some(*at),
+            position: match fix {
+                Err(lacking) => PositionState::None(*lacking),
+                Ok(_) if doubts.cable.is_some() => PositionState::Doubtful(PositionDoubt::Cable),
+                Ok(_) if reserved_m > SPREAD_SHARE * self.state.target_m => {
+                    PositionState::Doubtful(PositionDoubt::Spread)
+                }
+                Ok(_) => PositionState::Ok,
+            },
+            chainage_m: situation.pose.map(|pose| pose.position.x()),
+            sd: *sd,
+            pass_sd_m: situation.pass_error_m,
+            stand_s: doubts.stand_s,
+            speed_mps: situation.pose.map(|_| situation.speed_mps),
+            advice: Some(*advice),
+            metres: standing.metres,
+            unsure: standing.unsure,
+            passed: standing.passed,
+            back_to_m: standing.back_to_m,
+            alerts: standing.alerts,
+            turning: source_bits(self.heads.iter().copied(), turning),
+            hung: doubts.hung,
+            deaf: source_bits(self.heads.iter().copied(), situation.deaf),
+            ..self.state
+        };
+        digest(&mut self.states, *at, situation, &self.state);
+        let as_of = LiveState { now: *at, ..self.state };
+        self.take_beat(&Beat { at: *at, state: &as_of, setting: doubts.setting });
+    }
+
+    pub(super) fn save(&self, to: &mut Saver) {
+        to.part("list of alerts");
+        self.list.save(to);
+        to.part("notes");
+        self.notes.save(to);
+        to.part("live state");
+        self.state.save(to);
+        to.part("streams of the alerter");
+        to.value(&self.without_effect);
+        self.states.save(to);
+        self.changes.save(to);
+    }
+
+    pub(super) fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        from.part("list of alerts")?;
+        self.list.restore(from)?;
+        from.part("notes")?;
+        self.notes.restore(from)?;
+        from.part("live state")?;
+        self.state.restore(from)?;
+        from.part("streams of the alerter")?;
+        self.without_effect = from.value()?;
+        self.states.restore(from)?;
+        self.changes.restore(from)
+    }
+}
+
+fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &LiveState) {
+    let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = state.metres;
+    let (why, from, to) = state.unsure.map_or((u64::MAX, 0, 0), |of| (of.why as u64, of.from, of.to));
+    let advice = state.advice.as_ref();
+    stream
+        .record(RecordKind::State)
+        .integer(at.0)
+        .integer(state.position.number())
+        .number(state.chainage_m.unwrap_or(0.0))
+        .number(situation.pass_error_m)
+        .integer(state.stand_s.into())
+        .number(situation.speed_mps)
+        .number(advice.map_or(0.0, |advice| advice.v_max_mps))
+        .integer(advice.map_or(u64::MAX, |advice| advice.reason as u64))
+        .number(advice.and_then(|advice| advice.predicted_t_m).unwrap_or(0.0))
+        .number(pass_m)
+        .number(fail_m)
+        .number(cannot_say_m)
+        .number(open_m)
+        .number(not_inspected_m)
+        .integer(why)
+        .integer(from.cast_unsigned())
+        .integer(to.cast_unsigned())
+        .integer(state.alert_bits())
+        .integer(state.turning);
+    for heard in state.heard.iter().take(state.sources.into()) {
+        stream.integer(heard.map_or(u64::MAX, |heard| heard.0));
+    }
+}
+
+/// Inputs of a tick, and how many of them have been applied.
+struct Inputs<'a> {
+    runs: &'a [RunInput],
+    commands: &'a [ReceivedCommand],
+    events: &'a [Event],
+    /// Numbers of runs, commands and events applied so far.
+    taken: (usize, usize, usize),
+}
+
+impl Alerter {
+    /// Applies everything that was consumed before an update. `event` is the index of the first event after
+    /// the update.
+    fn take_before(&mut self, event: usize, inputs: &mut Inputs<'_>) {
+        self.take_until(Some(event), inputs);
+        self.hear(inputs, event);
+    }
+
+    /// Applies an update. Everything before it must have been applied.
+    fn take_beat(&mut self, beat: &Beat<'_>) {
+        let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
+        self.list.beat(beat, &mut to);
+    }
+
+    /// Applies the rest of the tick.
+    fn take_rest(&mut self, inputs: &mut Inputs<'_>) {
+        self.take_until(None, inputs);
+        self.hear(inputs, inputs.events.len());
+    }
+
+    /// Applies a changed run.
+    fn take_run(&mut self, run: &RunInput) {
+        let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
+        self.list.take_run(run, &mut to);
+    }
+
+    /// Records the times of the sensors' readings, up to the event with this index.
+    fn hear(&mut self, inputs: &mut Inputs<'_>, until: usize) {
+        for event in inputs.events.get(inputs.taken.2..until).unwrap_or_default() {
+            if let Some(slot) = self.state.heard.get_mut(event.source.index()) {
+                *slot = Some(event.received);
+            }
+        }
+        inputs.taken.2 = until.max(inputs.taken.2);
+    }
+
+    /// Applies runs and commands up to an update, or all of them.
+    ///
+    /// A command comes before the results of the event that follows it.
+    fn take_until(&mut self, beat: Option<usize>, inputs: &mut Inputs<'_>) {
+        loop {
+            let run = inputs.runs.get(inputs.taken.0);
+            let run = run.filter(|run| {
+                beat.is_none_or(|event| run.event < event || run.event == event && run.at_beat)
+            });
+            let command = inputs.commands.get(inputs.taken.1);
+            let command = command.filter(|command| beat.is_none_or(|event| command.before <= event));
+            match (run, command) {
+                (Some(run), command) if command.is_none_or(|command| command.before > run.event) => {
+                    inputs.taken.0 += 1;
+                    self.take_run(run);
+                }
+                (_, Some(command)) => {
+                    inputs.taken.1 += 1;
+                    self.hear(inputs, command.before);
+                    self.take_command(command);
+                }
+                (_, None) => return,
+            }
+        }
+    }
+
+    fn take_command(&mut self, received: &ReceivedCommand) {
+        let ReceivedCommand { at, command, .. } = *received;
+        let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
+        let has_effect = match command {
+            Command::Acknowledge { alert, by } => self.list.acknowledge(alert, by, at, &mut to),
+            Command::Silence { .. } => self.list.silence(at, &mut to),
+            Command::Note { text, by } => {
+                let note = self.notes.take(at, by, text, self.list.x_m());
+                digest_note(&mut self.changes, &note);
+                self.tell(&note);
+                true
+            }
+            Command::Voice { id, by } => {
+                let note = self.notes.speak(at, by, id, self.list.x_m());
+                digest_voice(&mut self.changes, &note);
+                self.tell(&note);
+                true
+            }
+            Command::Voiced { id, seconds } => {
+                let note = self.notes.spoken(id, seconds);
+                if let Some(note) = note {
+                    digest_voice(&mut self.changes, &note);
+                    self.tell(&note);
+                }
+                note.is_some()
+            }
+            Command::Recording { fails } => {
+                self.list.set_recording(fails, at, &mut to);
+                true
+            }
+            Command::Limits { battery_pct } => {
+                self.list.set_battery(battery_pct);
+                true
+            }
+            Command::Time => {
+                self.list.time(at, &LiveState { now: at, ..self.state }, &mut to);
+                true
+            }
+        };
+        self.without_effect += u64::from(!has_effect);
+    }
+
+    fn tell(&mut self, note: &Note) {
+        if self.notices.len() < self.notices.capacity() {
+            self.notices.push(Notice::Note(*note));
+        }
+    }
+}
+
+fn digest_voice(stream: &mut ResultStream, note: &Note) {
+    let Spoken { id, seconds } = note.voice.unwrap_or(Spoken { id: 0, seconds: 0 });
+    stream
+        .record(RecordKind::Voice)
+        .integer(note.at.0)
+        .integer(note.number.into())
+        .number(note.chainage_m.unwrap_or(0.0))
+        .text(note.by.as_str())
+        .integer(id.into())
+        .integer(seconds.into());
+}
+
+fn digest_note(stream: &mut ResultStream, note: &Note) {
+    stream
+        .record(RecordKind::Note)
+        .integer(note.at.0)
+        .integer(note.number.into())
+        .number(note.chainage_m.unwrap_or(0.0))
+        .text(note.by.as_str());
+    let (whole, rest) = note.text.as_str().as_bytes().as_chunks::<8>();
+    for word in whole {
+        stream.integer(u64::from_le_bytes(*word));
+    }
+    let mut last = [0; 8];
+    last.iter_mut().zip(rest).for_each(|(byte, of)| *byte = *of);
+    stream.integer(u64::from_le_bytes(last));
+}
+
+#[cfg(test)]
+mod tests;

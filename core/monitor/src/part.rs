@@ -1,0 +1,191 @@
+//! A world of the loop: entities, resources, the systems of each stage, and the state that snapshots contain.
+
+use core::any::TypeId;
+
+use bevy_ecs::component::{Component, Mutable};
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::Resource;
+use bevy_ecs::schedule::{
+    IntoScheduleConfigs, LogLevel, Schedule, ScheduleBuildSettings, SingleThreadedExecutor, SystemSet,
+};
+use bevy_ecs::system::ScheduleSystem;
+use bevy_ecs::world::World;
+
+use super::error::PluginError;
+use super::stage::Stage;
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
+
+/// A world whose stages are of type `S`. Each stage has a schedule of its own.
+pub struct Part<S> {
+    pub(super) world: World,
+    stages: Vec<(S, Schedule)>,
+    /// Entities whose components are state, in snapshot order.
+    pub(super) entities: Vec<Entity>,
+    state: Vec<StateKind>,
+}
+
+/// A kind of state: name, type of the resource or component, and functions to save and restore it.
+struct StateKind {
+    kind: TypeId,
+    name: &'static str,
+    save: fn(&World, &[Entity], &mut Saver),
+    restore: fn(&mut World, &[Entity], &mut Restorer<'_>) -> Result<(), SnapshotError>,
+}
+
+/// Order of the systems of a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
+enum Order {
+    Within,
+    After,
+}
+
+impl<S: Stage> Part<S> {
+    pub(super) fn new() -> Self {
+        let stages = S::ALL.iter().map(|stage| (*stage, schedule())).collect();
+        Self { world: World::new(), stages, entities: Vec::new(), state: Vec::new() }
+    }
+
+    /// Adds a resource for a plugin's own systems.
+    pub fn insert_resource(&mut self, resource: impl Resource) {
+        self.world.insert_resource(resource);
+    }
+
+    /// Adds a resource that affects results. Snapshots store it under this name.
+    pub fn insert_state(
+        &mut self,
+        name: &'static str,
+        resource: impl Resource<Mutability = Mutable> + Stateful,
+    ) {
+        self.add_state_of(name, &resource);
+        self.world.insert_resource(resource);
+    }
+
+    fn add_state_of<T: Resource<Mutability = Mutable> + Stateful>(&mut self, name: &'static str, _: &T) {
+        self.add_state(StateKind {
+            kind: TypeId::of::<T>(),
+            name,
+            save: |world, _, to| world.resource::<T>().save(to),
+            restore: |world, _, from| world.resource_mut::<T>().restore(from),
+        });
+    }
+
+    /// Makes a component of the entities state.
+    pub(super) fn add_component_state<T: Component<Mutability = Mutable> + Stateful>(
+        &mut self,
+        name: &'static str,
+    ) {
+        self.add_state(StateKind {
+            kind: TypeId::of::<T>(),
+            name,
+            save: |world, entities, to| to.each(entities.iter().filter_map(|entity| world.get::<T>(*entity))),
+            restore: |world, entities, from| {
+                entities.iter().try_for_each(|entity| match world.get_mut::<T>(*entity) {
+                    Some(mut component) => component.restore(from),
+                    None => Ok(()),
+                })
+            },
+        });
+    }
+
+    fn add_state(&mut self, state: StateKind) {
+        if self.state.iter().all(|other| other.kind != state.kind) {
+            self.state.push(state);
+        }
+    }
+
+    /// Adds systems to a stage. The caller must order systems of one stage that share data.
+    pub fn add_systems<M>(&mut self, stage: S, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
+        self.schedule(stage).add_systems(systems.in_set(Order::Within));
+    }
+
+    /// Adds systems that run when a stage has finished, such as measurements of it.
+    pub fn add_systems_after<M>(&mut self, stage: S, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
+        self.schedule(stage).add_systems(systems.in_set(Order::After));
+    }
+
+    /// A resource of this world.
+    pub fn resource<T: Resource>(&self) -> Option<&T> {
+        self.world.get_resource::<T>()
+    }
+
+    fn schedule(&mut self, stage: S) -> &mut Schedule {
+        let found = self.stages.iter_mut().find(|(other, _)| *other == stage);
+        #[expect(clippy::expect_used, reason = "Part::new gives each stage a schedule")]
+        found.map(|(_, schedule)| schedule).expect("every stage has a schedule")
+    }
+
+    /// Builds the schedules.
+    ///
+    /// Errors: the order of two systems that share data is ambiguous.
+    pub(super) fn initialize(&mut self) -> Result<(), PluginError> {
+        let Self { world, stages, .. } = self;
+        stages.iter_mut().try_for_each(|(stage, schedule)| {
+            let built = schedule.initialize(world);
+            let why = |error| PluginError::Schedule { why: format!("stage {stage:?}: {error:?}") };
+            built.map(|_| ()).map_err(why)
+        })
+    }
+
+    /// Runs the systems of a stage.
+    pub(super) fn run(&mut self, stage: S) {
+        let Self { world, stages, .. } = self;
+        for (_, schedule) in stages.iter_mut().filter(|(other, _)| *other == stage) {
+            schedule.run(world);
+        }
+    }
+
+    /// Saves the state.
+    pub(super) fn save(&self, to: &mut Saver) {
+        for state in &self.state {
+            to.part(state.name);
+            (state.save)(&self.world, &self.entities, to);
+        }
+    }
+
+    /// Restores the state.
+    ///
+    /// Errors: the snapshot is of another vehicle or version.
+    pub(super) fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        let Self { world, entities, state, .. } = self;
+        state.iter().try_for_each(|state| {
+            from.part(state.name)?;
+            (state.restore)(world, entities, from)
+        })
+    }
+}
+
+#[cfg(test)]
+impl<S: Stage> Part<S> {
+    /// Panics unless resources and components of the entities are either state or among the given types.
+    ///
+    /// The given types must be constant since arming, or set in each tick.
+    pub(super) fn has_state_but_for(&self, others: &[TypeId]) {
+        let mut bare = World::new();
+        schedule().run(&mut bare);
+        let kinds = |world: &World| -> Vec<TypeId> {
+            world.iter_resources().filter_map(|(_, info, _)| info.type_id()).collect()
+        };
+        let components = self.entities.iter().flat_map(|entity| {
+            let ids = self.world.entity(*entity).archetype().components().to_vec();
+            ids.into_iter().filter_map(|id| self.world.components().get_info(id)?.type_id())
+        });
+        let found: Vec<TypeId> = kinds(&self.world).into_iter().chain(components).collect();
+        let state: Vec<TypeId> = self.state.iter().map(|state| state.kind).collect();
+        let listed = [&state[..], others, &kinds(&bare)].concat();
+        let unlisted = found.iter().filter(|kind| !listed.contains(kind)).count();
+        assert_eq!(unlisted, 0, "types that are neither state nor listed, of {}", found.len());
+        assert!(state.iter().chain(others).all(|kind| found.contains(kind)), "a listed type is missing");
+    }
+}
+
+/// Empty schedule: single-threaded, with an ambiguous order of systems as an error.
+fn schedule() -> Schedule {
+    let mut schedule = Schedule::default();
+    schedule.set_executor(SingleThreadedExecutor::new());
+    schedule.set_build_settings(ScheduleBuildSettings {
+        ambiguity_detection: LogLevel::Error,
+        ..ScheduleBuildSettings::default()
+    });
+    schedule.configure_sets((Order::Within, Order::After).chain());
+    schedule
+}

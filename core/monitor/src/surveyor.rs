@@ -1,0 +1,214 @@
+//! The surveyor: the world that converts placed pings to samples, passes, sections, verdicts and runs.
+//!
+//! Its entities are the heads.
+
+mod classify;
+mod count;
+mod coverage_extent;
+mod driving;
+mod due;
+mod heads;
+mod judge;
+mod missing_samples;
+mod navigation_alerts;
+mod passages;
+mod samples;
+mod standing;
+mod survey;
+mod walk;
+mod wall;
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::Resource;
+
+use super::alerts::Alerts;
+use super::entities::{HeadClassifier, HeadEntities, HeadFrontier, HeadSweep};
+use super::error::PluginError;
+use super::merge::MAX_TICK_PACKETS;
+use super::part::Part;
+use super::placer::{Placed, PlacedTick};
+use super::resources::{Coverage, Digests, Finder, Tally};
+use super::stage::{Stage as _, SurveyStage};
+use classify::{Classified, NearWall};
+use driving::Driving;
+use headrace_coverage::{Outlook, Request};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError};
+use headrace_geometry::time::MonoNs;
+pub use survey::Found;
+use survey::{Cursor, Requests};
+
+/// Part of the loop from placed pings to verdicts.
+pub struct Surveyor {
+    part: Part<SurveyStage>,
+    /// A tick without packets, which the world has between ticks.
+    nothing: Arc<Placed>,
+}
+
+impl Surveyor {
+    /// Creates the surveyor from a world that has heads, tunnel and target.
+    ///
+    /// Errors: the order of two systems is ambiguous.
+    pub(super) fn new(
+        mut part: Part<SurveyStage>,
+        coverage: Coverage,
+        finder: Finder,
+        keeps_results: bool,
+    ) -> Result<Self, PluginError> {
+        let sections = coverage.sections.len();
+        let mut digests = Digests::default();
+        if keeps_results {
+            digests.pings.keep();
+            digests.judgements.keep();
+        }
+        part.insert_state("streams of the surveyor", digests);
+        part.insert_resource(PlacedTick::default());
+        part.insert_resource(Classified::with_room());
+        part.insert_resource(Cursor::default());
+        part.insert_resource(Requests(Vec::with_capacity(sections + MAX_TICK_PACKETS)));
+        part.insert_resource(Found::with_room(sections));
+        part.add_component_state::<HeadClassifier>("classifiers");
+        part.add_component_state::<HeadSweep>("sweeps");
+        part.add_component_state::<HeadFrontier>("reach of heads");
+        part.insert_state("relief", NearWall::default());
+        part.insert_state("driving", Driving::default());
+        part.insert_state("coverage", coverage);
+        part.insert_state("search for holes", finder);
+        part.insert_state("observations", Alerts::default());
+        part.insert_state("tally", Tally::default());
+        part.add_systems(SurveyStage::Classify, classify::classify_returns);
+        part.add_systems(SurveyStage::Walk, walk::walk);
+        part.add_systems(SurveyStage::Judge, judge::judge_due);
+        part.add_systems(SurveyStage::Report, standing::report_standing);
+        part.initialize()?;
+        // The first run of a schedule allocates memory. Without pings it has no other effect.
+        SurveyStage::ALL.iter().for_each(|stage| part.run(*stage));
+        Ok(Self { part, nothing: Arc::default() })
+    }
+
+    /// Processes the placed pings of a tick. Allocates: never.
+    pub(super) fn tick(&mut self, placed: &Arc<Placed>) {
+        let Self { part, nothing } = self;
+        part.world.resource_mut::<Found>().clear();
+        *part.world.resource_mut::<Cursor>() = Cursor::default();
+        part.world.resource_mut::<PlacedTick>().0 = Arc::clone(placed);
+        part.run(SurveyStage::Classify);
+        while part.world.resource::<Cursor>().next < placed.items.len() {
+            SurveyStage::OF_STOP.into_iter().for_each(|stage| part.run(stage));
+        }
+        part.run(SurveyStage::Surveyed);
+        part.world.resource_mut::<PlacedTick>().0 = Arc::clone(nothing);
+    }
+
+    /// Clears the results of the last tick from the streams.
+    pub(super) fn next_tick(&mut self) {
+        self.part.world.resource_mut::<Digests>().next_tick();
+    }
+
+    /// Findings of the last tick.
+    pub fn found(&self) -> &Found {
+        self.part.world.resource()
+    }
+
+    /// Coverage of the wall.
+    pub fn coverage(&self) -> &Coverage {
+        self.part.world.resource()
+    }
+
+    /// Counts of pings over the whole dive.
+    pub fn tally(&self) -> &Tally {
+        self.part.world.resource()
+    }
+
+    /// Alerts about the dive as a whole.
+    pub fn alerts(&self) -> &Alerts {
+        self.part.world.resource()
+    }
+
+    /// Result streams.
+    pub fn digests(&self) -> &Digests {
+        self.part.world.resource()
+    }
+
+    /// A resource of a plugin.
+    pub fn resource<T: Resource>(&self) -> Option<&T> {
+        self.part.resource()
+    }
+
+    /// Outlook at a time: where samples have landed and where they may still land.
+    pub(super) fn outlook(&self, at: MonoNs) -> Outlook {
+        let world = &self.part.world;
+        let heads = world.resource::<HeadEntities>().0.iter();
+        let reaches = heads.filter_map(|head| world.get::<HeadFrontier>(*head)?.0);
+        self.coverage().frontier.outlook(reaches, at)
+    }
+
+    /// Classifies the returns that still wait at the end of a dive, when no more returns will come. Allocates.
+    pub(super) fn end_returns(&mut self) {
+        self.part.world.resource_mut::<Found>().clear();
+        wall::end_returns(&mut self.part.world);
+    }
+
+    /// Sections to be judged at the end of a dive, and the fields common to all requests for them.
+    pub(super) fn open_requests(&mut self, at: MonoNs) -> (Vec<i64>, Option<Request>) {
+        let outlook = self.outlook(at);
+        let (mut open, mut common) = (Vec::new(), None);
+        let mut ask = |request: Request| {
+            open.push(request.section);
+            common = Some(request);
+        };
+        self.part.world.resource_mut::<Coverage>().sections.unsettled(&outlook, &mut ask);
+        (open, common)
+    }
+
+    /// Judges a section at the end of a dive.
+    pub(super) fn judge_at_end(&mut self, request: Request) {
+        let Self { part, .. } = self;
+        part.world.resource_mut::<Found>().clear();
+        *part.world.resource_mut::<Cursor>() = Cursor::default();
+        part.world.resource_mut::<Requests>().0.push(request);
+        part.run(SurveyStage::Judge);
+    }
+
+    /// Frees the memory of the samples.
+    pub(super) fn release_samples(&mut self) {
+        self.part.world.resource_mut::<Coverage>().store.release();
+    }
+
+    pub(super) fn save(&self, to: &mut Saver) {
+        self.part.save(to);
+    }
+
+    pub(super) fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.part.restore(from)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::any::TypeId;
+
+    use super::*;
+    use crate::entities::{Head, HiddenAngles, Mounted};
+    use crate::fixtures::armed;
+    use crate::resources::{Target, TunnelDesign};
+
+    /// Other resources and components are constant since arming, or set in each tick.
+    #[test]
+    fn snapshots_contain_all_state_of_the_world() {
+        let dive = armed();
+        dive.view().surveyor().part.has_state_but_for(&[
+            TypeId::of::<Head>(),
+            TypeId::of::<HeadEntities>(),
+            TypeId::of::<HiddenAngles>(),
+            TypeId::of::<Mounted>(),
+            TypeId::of::<Target>(),
+            TypeId::of::<TunnelDesign>(),
+            TypeId::of::<Classified>(),
+            TypeId::of::<Cursor>(),
+            TypeId::of::<Found>(),
+            TypeId::of::<PlacedTick>(),
+            TypeId::of::<Requests>(),
+        ]);
+    }
+}

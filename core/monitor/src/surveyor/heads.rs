@@ -1,0 +1,15 @@
+//! Heads, as the systems of a walk see them.
+
+use bevy_ecs::prelude::Query;
+
+use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
+
+/// A head: number, mount, hidden angles, sweep and reach.
+pub(super) type Heads<'w, 's> = Query<'w, 's, HeadParts>;
+type HeadParts = (
+    &'static Head,
+    &'static Mounted,
+    &'static HiddenAngles,
+    &'static mut HeadSweep,
+    &'static mut HeadFrontier,
+);

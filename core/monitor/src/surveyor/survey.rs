@@ -1,0 +1,94 @@
+//! State that a walk over the pings changes, and its findings.
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+use bevy_ecs::system::SystemParam;
+
+use super::driving::Driving;
+use crate::alert_list::RunInput;
+use crate::alerts::Alerts;
+use crate::merge::MAX_TICK_PACKETS;
+use crate::messages::{Notice, Standing};
+use crate::resources::{Coverage, Digests, Tally, Target};
+use headrace_coverage::Request;
+
+/// Maximum number of runs that change when one section is judged: its own run and two others.
+const RUNS_EACH: usize = 3;
+/// Notices per judged section: one for the section, one per run, and one for an alert.
+const NOTICES_EACH: usize = 2 + RUNS_EACH;
+
+/// Place of the walk among the items of a tick.
+#[derive(Debug, Clone, Copy, Default, Resource)]
+pub(super) struct Cursor {
+    /// Index of the next item.
+    pub(super) next: usize,
+    /// Index of the reading at which the walk has stopped, and whether it has stopped at an update before it.
+    pub(super) stop: (usize, bool),
+}
+
+/// Sections to be judged, in order.
+#[derive(Debug, Resource)]
+pub(super) struct Requests(pub(super) Vec<Request>);
+
+/// Findings of the surveyor in a tick.
+#[derive(Debug, Resource)]
+pub struct Found {
+    /// Metres by verdict and active alerts at each update, in order.
+    pub standings: Vec<Standing>,
+    /// Changed runs, in order.
+    pub(crate) runs: Vec<RunInput>,
+    /// Changed sections, changed runs and new alerts, in order.
+    pub notices: Vec<Notice>,
+}
+
+impl Found {
+    /// Lists with room for all sections. Allocates: all memory of the lists.
+    pub(super) fn with_room(sections: usize) -> Self {
+        // A jump along the tunnel may make all sections due for judging at once.
+        let most = sections + MAX_TICK_PACKETS;
+        Self {
+            standings: Vec::with_capacity(MAX_TICK_PACKETS),
+            runs: Vec::with_capacity(RUNS_EACH * most),
+            notices: Vec::with_capacity(NOTICES_EACH * most),
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.standings.clear();
+        self.runs.clear();
+        self.notices.clear();
+    }
+}
+
+/// The wall, and all else that a walk over the pings changes.
+#[derive(SystemParam)]
+pub(super) struct Survey<'w> {
+    pub(super) coverage: ResMut<'w, Coverage>,
+    pub(super) driving: ResMut<'w, Driving>,
+    pub(super) requests: ResMut<'w, Requests>,
+    pub(super) tally: ResMut<'w, Tally>,
+    pub(super) cursor: ResMut<'w, Cursor>,
+    pub(super) target: Res<'w, Target>,
+}
+
+/// Destinations of results.
+#[derive(SystemParam)]
+pub(super) struct Outputs<'w> {
+    pub(super) found: ResMut<'w, Found>,
+    pub(super) digests: ResMut<'w, Digests>,
+    pub(super) alerts: ResMut<'w, Alerts>,
+}
+
+/// References to [`Outputs`].
+pub(super) struct OutputRefs<'a> {
+    pub(super) notices: &'a mut Vec<Notice>,
+    pub(super) runs: &'a mut Vec<RunInput>,
+    pub(super) digests: &'a mut Digests,
+    pub(super) alerts: &'a mut Alerts,
+}
+
+impl Outputs<'_> {
+    pub(super) fn refs(&mut self) -> OutputRefs<'_> {
+        let Found { runs, notices, .. } = &mut *self.found;
+        OutputRefs { notices, runs, digests: &mut self.digests, alerts: &mut self.alerts }
+    }
+}
