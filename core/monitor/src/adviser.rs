@@ -156,6 +156,11 @@ fn advise(
     for update in placed.updates() {
         let (at, situation) = (update.at, &update.situation);
         let advice = advisor.advise(at, situation, begun);
+        debug_assert!(
+            advice.v_max_mps.is_finite() && advice.v_max_mps >= 0.0,
+            "advised {} m/s",
+            advice.v_max_mps
+        );
         digest(&mut stream.0, at, &advice);
         let chainage_m = situation.pose.map(|pose| pose.position.x());
         let entry = AdviceEntry { at, chainage_m, speed_mps: situation.speed_mps, advice };

@@ -18,10 +18,17 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 /// A world whose stages are of type `S`. Each stage has a schedule of its own.
 pub struct Part<S> {
     pub(super) world: World,
-    stages: Vec<(S, Schedule)>,
+    stages: Vec<Systems<S>>,
     /// Entities whose components are state, in snapshot order.
     pub(super) entities: Vec<Entity>,
     state: Vec<StateKind>,
+}
+
+/// Systems of a stage.
+struct Systems<S> {
+    stage: S,
+    schedule: Schedule,
+    is_empty: bool,
 }
 
 /// A kind of state: name, type of the resource or component, and functions to save and restore it.
@@ -41,7 +48,8 @@ enum Order {
 
 impl<S: Stage> Part<S> {
     pub(super) fn new() -> Self {
-        let stages = S::ALL.iter().map(|stage| (*stage, schedule())).collect();
+        let systems = |stage: &S| Systems { stage: *stage, schedule: schedule(), is_empty: true };
+        let stages = S::ALL.iter().map(systems).collect();
         Self { world: World::new(), stages, entities: Vec::new(), state: Vec::new() }
     }
 
@@ -109,9 +117,11 @@ impl<S: Stage> Part<S> {
     }
 
     fn schedule(&mut self, stage: S) -> &mut Schedule {
-        let found = self.stages.iter_mut().find(|(other, _)| *other == stage);
+        let found = self.stages.iter_mut().find(|other| other.stage == stage);
         #[expect(clippy::expect_used, reason = "Part::new gives each stage a schedule")]
-        found.map(|(_, schedule)| schedule).expect("every stage has a schedule")
+        let systems = found.expect("every stage has a schedule");
+        systems.is_empty = false;
+        &mut systems.schedule
     }
 
     /// Builds the schedules.
@@ -119,7 +129,7 @@ impl<S: Stage> Part<S> {
     /// Errors: the order of two systems that share data is ambiguous.
     pub(super) fn initialize(&mut self) -> Result<(), PluginError> {
         let Self { world, stages, .. } = self;
-        stages.iter_mut().try_for_each(|(stage, schedule)| {
+        stages.iter_mut().try_for_each(|Systems { stage, schedule, .. }| {
             let built = schedule.initialize(world);
             let why = |error| PluginError::Schedule { why: format!("stage {stage:?}: {error:?}") };
             built.map(|_| ()).map_err(why)
@@ -129,8 +139,9 @@ impl<S: Stage> Part<S> {
     /// Runs the systems of a stage.
     pub(super) fn run(&mut self, stage: S) {
         let Self { world, stages, .. } = self;
-        for (_, schedule) in stages.iter_mut().filter(|(other, _)| *other == stage) {
-            schedule.run(world);
+        // An empty schedule takes time, too.
+        if let Some(systems) = stages.iter_mut().find(|other| other.stage == stage && !other.is_empty) {
+            systems.schedule.run(world);
         }
     }
 

@@ -154,6 +154,15 @@ impl Placer {
         PlaceStage::ALL.iter().for_each(|stage| part.run(*stage));
         self.swap_lists(into);
         self.report(into);
+        debug_assert!(
+            into.items.is_sorted_by_key(|item| item.event),
+            "items are in the order of their events"
+        );
+        debug_assert!(
+            into.items.iter().all(|item| item.event <= into.events.len()),
+            "items belong to events"
+        );
+        debug_assert!(into.commands.0.is_sorted_by_key(|command| command.before), "commands are in order");
     }
 
     /// Results before the next tick, with room for any tick. Allocates: all memory of the lists.

@@ -108,6 +108,11 @@ impl Loop {
             alerter.next_tick();
         }
         surveyor.tick(placed);
+        debug_assert_eq!(
+            surveyor.found().standings.len(),
+            advised.entries.len(),
+            "advice of the same updates"
+        );
         alerter.tick(placed, surveyor.found(), advised, now);
         self.publish();
         self.ticks += 1;

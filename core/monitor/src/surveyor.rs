@@ -98,6 +98,7 @@ impl Surveyor {
         }
         part.run(SurveyStage::Surveyed);
         part.world.resource_mut::<PlacedTick>().0 = Arc::clone(nothing);
+        debug_assert_eq!(self.found().standings.len(), placed.updates().count(), "a standing at each update");
     }
 
     /// Clears the results of the last tick from the streams.

@@ -39,6 +39,7 @@ pub(super) fn decode(
         }
         let before = events.0.len();
         let sensor = entities.of_source(source).and_then(|entity| sensors.get_mut(entity).ok());
+        debug_assert!(sensor.is_some(), "source {} of a packet has no decoder", source.0);
         let Some((mut decoder, mut health)) = sensor else { continue };
         decoder.0.decode(packet, &mut |mut decoded| {
             sound_speed.pass(source, &mut decoded);

@@ -51,7 +51,14 @@ pub(super) fn georeference(
             }
             Positioned::Ping { event: index, sensor, fix } => {
                 let (Some(event), Ok(head)) = (events.0.get(index), heads.get_mut(sensor)) else { continue };
-                let Reading::Sonar(sonar) = event.reading else { continue };
+                let Reading::Sonar(sonar) = event.reading else {
+                    debug_assert!(
+                        false,
+                        "event {index} was positioned as a ping, but is {:?}",
+                        event.reading
+                    );
+                    continue;
+                };
                 let placement = Placement::Ping(place(event, &sonar, fix, head, &tunnel));
                 placed.0.push(PlacedItem { event: index, placement });
             }

@@ -51,7 +51,10 @@ fn judge_one(
     {
         *unsure = Some(here);
     }
-    let Some(section) = sections.get(request.section) else { return };
+    let Some(section) = sections.get(request.section) else {
+        debug_assert!(false, "section {} has changed, but doesn't exist", request.section);
+        return;
+    };
     digest(&mut digests.judgements, request, change as u64, section);
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);

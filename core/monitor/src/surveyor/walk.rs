@@ -89,6 +89,7 @@ fn note_ping(
         missing_samples::note_away(&mut driving.lacking, now, heads, here, &tunnel.profile, coverage);
     }
     let head = site.entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
+    debug_assert!(head.is_some(), "head {} of a placed ping is unknown to the surveyor", ping.head);
     let Some((.., mut sweep, mut frontier)) = head else { return };
     missing_samples::note_ping(&mut driving.lacking, ping, &mut coverage.lacks);
     passages::note_passage(coverage, &frontier, &driving.now, (ping, &tunnel.profile));

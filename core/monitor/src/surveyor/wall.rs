@@ -89,7 +89,9 @@ pub(super) fn end_returns(world: &mut World) {
     let outputs = outputs.refs();
     let mut context = WallContext { coverage: &mut coverage, tunnel: &tunnel, tally: &mut tally, outputs };
     for head in &entities.0 {
-        let Ok((classifier, mut sweep)) = sweeps.get_mut(*head) else { continue };
+        let found = sweeps.get_mut(*head);
+        debug_assert!(found.is_ok(), "a head has no sweep");
+        let Ok((classifier, mut sweep)) = found else { continue };
         for waiting in sweep.waiting.take() {
             settle(&mut context, &mut sweep, &waiting, (false, classifier.0.distrusted().is_some()));
         }
@@ -142,7 +144,10 @@ fn store(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing
 fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing, is_distrusted: bool) {
     context.tally.doubtful += 1;
     digest(context.outputs.digests, ping, RecordKind::Doubtful);
-    let Outcome::Sample { point, .. } = ping.outcome else { return };
+    let Outcome::Sample { point, .. } = ping.outcome else {
+        debug_assert!(false, "a ping without a return was classified: {:?}", ping.outcome);
+        return;
+    };
     let aim = ping.origin.and_then(|origin| aim(context.tunnel, &origin, &point));
     let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
     store(context, sweep, &lost);
