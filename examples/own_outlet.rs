@@ -11,9 +11,9 @@ use std::thread;
 use std::time::Duration;
 
 use crossbeam::queue::ArrayQueue;
-use headrace::devices::KINDS;
 use headrace_config::Document;
 use headrace_coverage::{Cause, Judgement};
+use headrace_devices::KINDS;
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::merge::MAX_TICK_BYTES;
 use headrace_monitor::messages::Notice;

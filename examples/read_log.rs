@@ -5,8 +5,8 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use headrace::devices::KINDS;
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_monitor::App;
 use headrace_monitor::pilot_text::station;
 use headrace_replay::drive::{Pace, drive};

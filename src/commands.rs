@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use crossbeam::channel::unbounded;
 use headrace_config::Document;
 use headrace_dashboard::Mode;
+use headrace_devices::KINDS;
 use headrace_geometry::time::DurNs;
 use headrace_replay::drive::{Pace, PacketSource as _};
 use headrace_replay::log::files_of;
@@ -16,7 +17,6 @@ use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::{Demo, Output, Replay, Run, Speed};
-use crate::devices::KINDS;
 use crate::dive::{Assembly, Clock, Dive, Recording};
 use crate::expect::{self, Golden};
 use crate::failure::{self, Failure};

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use headrace_config as config;
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{EmulatedPort, wait_for_any};
 use headrace_sensor::connect::Connect;
@@ -12,7 +13,6 @@ use headrace_sensor::driver::Carrier;
 use headrace_simulator::{START, Scene, Simulation};
 
 use crate::cli::Emulate;
-use crate::devices::KINDS;
 use crate::failure::{self, Failure};
 use crate::files::{self, Beside};
 use crate::live::connections;

@@ -1,4 +1,4 @@
-//! The `headrace` command as a library: command line, configuration and list of device kinds.
+//! The `headrace` command as a library: command line and configuration.
 //!
 //! Other crates do the work. A custom binary calls only [`main`].
 
@@ -6,7 +6,6 @@ mod calibrate;
 mod check;
 mod cli;
 mod commands;
-pub mod devices;
 mod dive;
 mod emulate;
 mod expect;

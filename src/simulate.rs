@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::time::MonoNs;
 use headrace_replay::atomic_file::AtomicFile;
 use headrace_replay::log::LogWriter;
@@ -14,7 +15,6 @@ use headrace_simulator::{START, Scene, Simulation, SoundingTruth, Take, TruthRow
 use serde_json::json;
 
 use crate::cli::{Explain, Simulate, TakeWhat};
-use crate::devices::KINDS;
 use crate::dive::log_header;
 use crate::explain::{explain, worth_of};
 use crate::failure::{self, Failure};

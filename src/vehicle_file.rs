@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use headrace_config::{Document, Loader};
+use headrace_devices::KINDS;
 use headrace_replay::log::LogInfo;
 use headrace_replay::log::format::VEHICLE_FILE;
 use headrace_vehicle::VehicleConfig;
 
-use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 

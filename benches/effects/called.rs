@@ -52,7 +52,7 @@ fn against_all(name: &str, text: &str, called: &Scene) {
         // Effects that are impossible in this scene are left out.
         if Scene::parse(
             headrace_config::Document::new("scene.toml", &with),
-            &headrace::devices::KINDS,
+            &headrace_devices::KINDS,
             &|name| {
                 let folder = headrace_tests::root().join("deploy/scenes");
                 std::fs::read(folder.join(name)).map_err(|error| error.to_string())

@@ -4,13 +4,13 @@ mod cable;
 mod outlook;
 
 use headrace_config::{ConfigErrors, Document};
+use headrace_devices::KINDS;
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_simulator::{Scene, SceneError, Simulation, position_error_model};
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
 
 use crate::cli::Check;
-use crate::devices::KINDS;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::logging::complain;

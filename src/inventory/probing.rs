@@ -1,11 +1,11 @@
 //! Probes of the device kinds, and the ports and addresses that receive them.
 
+use headrace_devices::KINDS;
 use headrace_ports::{Found, probe};
 use headrace_sensor::connect::Connect;
 use headrace_sensor::driver::{Carrier, Probe};
 
 use super::state::Probed;
-use crate::devices::KINDS;
 
 /// All probes, in the order in which they are used.
 fn all() -> Vec<Box<dyn Probe>> {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use headrace_config::Document;
 use headrace_config::Loader;
+use headrace_devices::KINDS;
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
@@ -18,7 +19,6 @@ use headrace_simulator::position_error_model;
 use headrace_vehicle::TunnelConfig;
 
 use crate::cli::Plan;
-use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 use crate::vehicle_file;

@@ -2,12 +2,12 @@
 //!
 //! The vehicle file is edited as text, string by string. Its keys and numbers are kept.
 
+use headrace_devices::KINDS;
 use headrace_replay::log::format::{FORMAT_KEY, VEHICLE_FILE};
 use headrace_replay::log::{DiveLog, LogHeader, SourceInfo, TRIMMED};
 use headrace_sensor::connect::{Connect, SerialPort};
 use headrace_vehicle::VehicleConfig;
 
-use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 

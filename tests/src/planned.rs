@@ -10,7 +10,7 @@ use headrace_vehicle::VehicleConfig;
 pub fn planned_mps(vehicle: &VehicleConfig, text: &str, mode: &str) -> f64 {
     let load = |_: &str| Ok(text.as_bytes().to_vec());
     let errors =
-        position_error_model::expected_errors(vehicle, "vehicle.toml", &headrace::devices::KINDS, &load)
+        position_error_model::expected_errors(vehicle, "vehicle.toml", &headrace_devices::KINDS, &load)
             .unwrap();
     let planner = Planner::new(vehicle.inspection().unwrap()).unwrap().with_errors(errors);
     let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();

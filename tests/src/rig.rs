@@ -6,9 +6,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use headrace::devices::KINDS;
 use headrace::line_record::InRecordings;
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::time::DurNs;
 use headrace_monitor::App;
 use headrace_monitor::report::Report;

@@ -25,7 +25,7 @@ pub fn scene_from(text: &str, load: FileLoader<'_>) -> Scene {
 
 /// Parses a scene and replaces its seed, if one is given.
 pub fn seeded(text: &str, load: FileLoader<'_>, seed: Option<u64>) -> Scene {
-    let scene = Scene::parse(Document::new("scene.toml", text), &headrace::devices::KINDS, load, seed);
+    let scene = Scene::parse(Document::new("scene.toml", text), &headrace_devices::KINDS, load, seed);
     scene.unwrap_or_else(|why| panic!("{why}"))
 }
 

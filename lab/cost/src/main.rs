@@ -7,13 +7,13 @@ use std::{fs, io};
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser};
-use headrace::devices::KINDS;
 use headrace_config::{ConfigErrors, Document};
 use headrace_cost::effort::Effort;
 use headrace_cost::error::CostError;
 use headrace_cost::page::{Bars, COST_VERSION, Results, table};
 use headrace_cost::scene::Inputs;
 use headrace_cost::trades::{GIVEN, TRADES};
+use headrace_devices::KINDS;
 use headrace_vehicle::VehicleConfig;
 
 /// Last line of a picture. The line marks the picture as written by this program.

@@ -4,11 +4,11 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace::devices::KINDS;
 use headrace_config::Document;
 use headrace_cost::page::Results;
 use headrace_cost::scene::file;
 use headrace_cost::verdicts::{Judged, errors, inner};
+use headrace_devices::KINDS;
 use headrace_oracle::dive::{JudgedDive, dive};
 use headrace_simulator::Scene;
 

@@ -4,10 +4,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
-use headrace::devices::KINDS;
 use headrace_cost::effort::Effort;
 use headrace_cost::scene::{Inputs, file};
 use headrace_cost::trades::survey;
+use headrace_devices::KINDS;
 
 #[test]
 fn survey_hours_add_up_and_true_holes_stay_within_the_planned_target() {

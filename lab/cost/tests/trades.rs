@@ -10,7 +10,7 @@ use headrace_cost::trades::{Measure, live, navigation, simulation, sureness, sur
 use headrace_sampling::layout::HeadLayout;
 
 fn inputs() -> Inputs<'static> {
-    Inputs { effort: Effort::Quick, kinds: &headrace::devices::KINDS, vehicle: None }
+    Inputs { effort: Effort::Quick, kinds: &headrace_devices::KINDS, vehicle: None }
 }
 
 fn measured(measure: Measure) -> Trade {

@@ -2,10 +2,11 @@
 //! simulation.
 
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::layout::HeadLayout;
-use headrace_sensor::device::{DeviceKind, Sense};
+use headrace_sensor::device::Sense;
 use headrace_simulator::{Scene, SceneError, Simulation};
 
 /// The speed that the paper states, m/s (§7.2).
@@ -60,15 +61,6 @@ pub(crate) struct Dive {
     /// Time between pings, s.
     pub ping_period_s: f64,
 }
-
-/// The kinds of devices in the vehicle files.
-const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Imagenex881Kind,
-    &headrace_ping1d::Ping1dKind,
-    &headrace_bar100::Bar100Kind,
-    &headrace_imu_can::ImuCanKind,
-    &headrace_tether_hid::TetherHidKind,
-];
 
 /// The shipped vehicle files by name.
 fn vehicle(name: &str) -> Result<Vec<u8>, String> {

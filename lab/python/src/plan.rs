@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use headrace_devices::KINDS;
 use headrace_sampling::plan::{Planner, Question};
 use headrace_simulator::position_error_model;
-use headrace_tables::KINDS;
 use pyo3::{Python, pyfunction};
 
 use crate::errors::Failure;

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_replay::log::LogInfo;
 use headrace_replay::log::format::VEHICLE_FILE;
 use headrace_replay::regular_file;
-use headrace_tables::KINDS;
 use headrace_vehicle::VehicleConfig;
 
 use crate::errors::Failure;

@@ -14,7 +14,6 @@
 
 mod column;
 mod error;
-mod kinds;
 mod parameters;
 mod replay;
 mod stoppable;
@@ -29,7 +28,6 @@ pub use arrow_schema;
 use arrow_schema::SchemaRef;
 
 pub use error::Error;
-pub use kinds::KINDS;
 pub use parameters::Parameters;
 pub use replay::log_digest;
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_fusion::Navigation;
 use headrace_monitor::App;
 use headrace_monitor::report::{LogReport, Report};
@@ -16,7 +17,6 @@ use headrace_replay::regular_file;
 use headrace_replay::smooth::FirstPass;
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
 
-use crate::kinds::KINDS;
 use crate::stoppable::Stoppable;
 use crate::{Error, Parameters};
 

@@ -3,18 +3,11 @@
 use std::fmt::Write as _;
 
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_sensor::device::{DeviceKind, Direction};
+use headrace_sensor::device::Direction;
 
 use crate::{Scene, SceneError, Simulation, TruthRow};
-
-pub(crate) const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Imagenex881Kind,
-    &headrace_ping1d::Ping1dKind,
-    &headrace_bar100::Bar100Kind,
-    &headrace_imu_can::ImuCanKind,
-    &headrace_tether_hid::TetherHidKind,
-];
 
 /// A vehicle that moves forward in a tunnel for `seconds` at a constant speed, with the effects of a scene.
 #[derive(Debug, Clone)]

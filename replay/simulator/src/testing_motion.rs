@@ -1,11 +1,11 @@
 //! A bench for effects: a vehicle with one or two devices of each kind, on short trajectories.
 
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::Direction;
 use headrace_sensor::measurement::Measurement;
 
-use crate::testing::KINDS;
 use crate::{Scene, SceneError, Simulation};
 
 const VEHICLE: &str = r#"

@@ -18,9 +18,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use headrace::devices::KINDS;
 use headrace::line_record::InRecordings;
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};

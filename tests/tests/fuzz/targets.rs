@@ -2,9 +2,9 @@
 
 use std::io::Cursor;
 
-use headrace::devices::KINDS;
 use headrace_config::Document;
 use headrace_config::plain::is_plain;
+use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_import::candump::Candump;
 use headrace_import::csv::Csv;

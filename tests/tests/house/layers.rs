@@ -1,4 +1,4 @@
-//! Checks the rules of layers, a core without I/O and locks, the length of files, and the metadata of each crate.
+//! Checks the rules of layers, a core without I/O and locks, and the metadata of each crate.
 
 use std::path::{Path, PathBuf};
 
@@ -41,6 +41,9 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
+/// The list of device kinds. It uses the core as devices do, and every crate of a device.
+const DEVICES: &str = "plugins/devices";
+
 /// Rust packages in the workspace `lab`.
 const LAB: [&str; 4] = ["lab/cost", "lab/engine", "lab/experiments", "lab/tables"];
 
@@ -57,6 +60,10 @@ fn may_need(place: &Path, needed: &Path) -> bool {
         "plugins" if place == Path::new("plugins/ports") => one_of(&FOR_PORTS),
         // The page shows the loop's results, so it may use every crate of the core.
         "plugins" if place == Path::new(PAGE) => core(needed).is_some(),
+        "plugins" if place == Path::new(DEVICES) => {
+            let aside = ["plugins/ports", PAGE, DEVICES].map(Path::new);
+            one_of(&FOR_DEVICES) || needed.starts_with("plugins") && !aside.contains(&needed)
+        }
         "plugins" => one_of(&FOR_DEVICES),
         "replay" => {
             let others =
@@ -95,6 +102,10 @@ fn layer_rule_rejects_dependencies_that_point_back() {
         ("plugins/bar100", "core/sensor", true),
         ("plugins/bar100", "core/geometry", false),
         ("plugins/bar100", "plugins/ping1d", false),
+        ("plugins/bar100", "plugins/devices", false),
+        ("plugins/devices", "plugins/bar100", true),
+        ("plugins/devices", "plugins/ports", false),
+        ("plugins/devices", "core/monitor", false),
         ("plugins/ports", "core/monitor", true),
         ("plugins/ports", "core/coverage", false),
         ("replay/simulator", "core/monitor", true),
@@ -103,6 +114,7 @@ fn layer_rule_rejects_dependencies_that_point_back() {
         ("replay/import", "replay/simulator", false),
         ("replay/import", "plugins/mavlink", true),
         ("replay/import", "plugins/ports", false),
+        ("replay/import", "plugins/devices", false),
         ("pictures", "replay/player", false),
         ("", "plugins/mavlink", true),
         ("", "tests/oracle", false),
@@ -157,7 +169,7 @@ fn every_crate_has_a_description() {
         }
     }
     for (name, package) in workspace().iter().filter(|(_, package)| package.place.starts_with("plugins")) {
-        if package.place == Path::new(PAGE) {
+        if [PAGE, DEVICES].map(Path::new).contains(&package.place.as_path()) {
             continue;
         }
         let readme = std::fs::read_to_string(package.folder().join("README.md"));

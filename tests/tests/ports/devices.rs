@@ -6,16 +6,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_ports::{Answer, EmulatedPort, probe, wait_for_any};
 use headrace_sensor::connect::Connect;
-use headrace_sensor::device::{DeviceKind, Direction, Emulated, EmulatorSetup};
+use headrace_sensor::device::{Direction, Emulated, EmulatorSetup};
 use headrace_sensor::driver::{Carrier, Probe};
 use headrace_vehicle::VehicleConfig;
 use serde_json::Value;
 
-const KINDS: [&dyn DeviceKind; 2] = [&headrace_imagenex881::Imagenex881Kind, &headrace_ping1d::Ping1dKind];
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 /// Number of requests without an answer after which a device counts as silent.
 const TRIES: u32 = 30;

@@ -2,8 +2,8 @@
 //!
 //! The time of a reading is the time of the part that contains the first byte of its frame.
 
-use headrace::devices::KINDS;
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::{Device, Direction, Emulated, Emulator, EmulatorSetup};

@@ -1,8 +1,8 @@
 //! Device bytes with changes, losses and insertions. All readings are finite and don't depend on splits, and the
 //! counts add up.
 
-use headrace::devices::KINDS;
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::Direction;
 use headrace_sensor::reading::{Decoded, Packet};

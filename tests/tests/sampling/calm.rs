@@ -1,6 +1,6 @@
 //! In calm dives, `plan` and the live advice agree on position errors and speeds.
 
-use headrace::devices::KINDS;
+use headrace_devices::KINDS;
 use headrace_sampling::margin::{APART_SHARE, error_time_s};
 use headrace_simulator::position_error_model;
 use headrace_tests::field_table::VEHICLES;

@@ -1,10 +1,10 @@
 //! Tests of the formats with constructed and arbitrary bytes.
 
 use headrace_config::Document;
+use headrace_devices::KINDS;
 use headrace_mavlink::MavHeader;
 use headrace_mavlink::dialect::ATTITUDE_DATA;
 use headrace_mavlink::message::Message;
-use headrace_sensor::device::DeviceKind;
 use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 
@@ -13,9 +13,6 @@ use crate::imagenex::ImagenexFormat;
 use crate::ping::PingFormat;
 use crate::tlog::TlogFormat;
 use crate::{Entry, Format, Step};
-
-const KINDS: [&dyn DeviceKind; 3] =
-    [&headrace_bar100::Bar100Kind, &headrace_mavlink::MavlinkKind, &headrace_ping1d::Ping1dKind];
 
 /// Returns the entries, the losses with their reasons, and the number of bytes left at the end.
 fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {

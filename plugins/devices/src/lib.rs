@@ -1,4 +1,4 @@
-//! Device kinds of this build. A new device adds a line here.
+//! The list of device kinds. A new device adds a line here.
 
 use headrace_sensor::device::DeviceKind;
 
