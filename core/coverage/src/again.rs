@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cause::Cause;
-use super::causes::Causes;
+use super::cause::{Cause, Causes};
 
 /// Speed for passing a missed stretch again, and whether speed helps at all.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

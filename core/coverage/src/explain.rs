@@ -5,13 +5,11 @@
 //! closer together. `docs/why/coverage.md` states the order of the factors and the reasons for it.
 
 mod case;
-mod driven;
 mod trial;
 
 use core::iter;
 
-use super::cause::Cause;
-use super::causes::Causes;
+use super::cause::{Cause, Causes};
 use super::evidence::Evidence;
 use super::hole::HoleFinder;
 use super::missing_samples::MissingSample;

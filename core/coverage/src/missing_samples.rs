@@ -5,8 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cause::Cause;
-use super::causes::Causes;
+use super::cause::{Cause, Causes};
 use headrace_geometry::snapshot::stateful;
 
 /// Capacity: the pings of four heads in five minutes without any return.

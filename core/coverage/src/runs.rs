@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::again::{Again, Failing, NAMED_OF, Tally};
-use super::cause::Cause;
-use super::causes::Causes;
+use super::cause::{Cause, Causes};
 use super::hole::Hole;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;

@@ -4,18 +4,16 @@ mod due;
 
 use core::ops::Range;
 
-use super::cause::Cause;
-use super::causes::Causes;
+use super::cause::{Cause, Causes};
 use super::evidence::Evidence;
 use super::explain::{Case, explain};
 use super::frontier::{Outlook, Reach, clear_of};
 use super::hole::{Hole, HoleFinder};
-use super::metres::Metres;
 use super::missing_samples::MissingSamples;
 use super::openings::Opening;
 use super::passage::PassError;
 use super::runs::{Run, RunChange, RunId, Runs, Telling};
-use super::section::{Judgement, Section, Verdict};
+use super::section::{Judgement, Metres, Section, Verdict};
 use super::store::SampleStore;
 use super::unsure::{Driven, Stretch};
 use super::visits::Visit;

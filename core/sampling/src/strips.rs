@@ -1,28 +1,24 @@
 //! Wall around a vehicle, divided into strips seen by the same heads, and the sample spacing on them.
 
+mod limit;
+mod thin;
+mod view;
+
 use serde::{Deserialize, Serialize};
 
 use super::error::SamplingError;
 use super::head::{HeadSet, MAX_HEADS};
+use super::losses::{LossRate, Sampled};
 use super::passes::Passes;
 use super::ring::{Ring, Sounding};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 
-mod arc;
-mod limit;
-mod lossy;
-mod sector;
-mod thin;
-mod view;
-
 use limit::Limit;
 use thin::Thin;
 
-pub use arc::Arc;
 pub use limit::Going;
-pub use sector::{PARTS, Sector};
-pub use view::View;
+pub use view::{Arc, PARTS, Sector, View};
 
 /// Width below which a strip is a rounding error, m.
 const NO_WIDTH_M: f64 = 1e-9;
@@ -403,6 +399,39 @@ impl Strips {
         }
         // Pings end at the edge of a sector, but up to a step before the edge of a hidden arc.
         (width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }, is_left_out)
+    }
+
+    /// Computes the number of passes over each strip that replace a single pass in a setting.
+    ///
+    /// The number is used with [`crate::passes::Passes::lossy`]. `rates` are the losses of each head, `None` for an
+    /// absent head.
+    ///
+    /// Allocates: not if the capacity suffices for the settings.
+    pub fn count_losses(&mut self, setting: usize, target_m: f64, rates: &[Option<LossRate>; MAX_HEADS]) {
+        let first = setting * self.strips.len();
+        self.needed.resize(self.steps_m.len(), [1.0; 2]);
+        let lost = |heads: HeadSet| heads.iter().filter_map(|head| *rates.get(head)?);
+        let all = HeadSet::first(MAX_HEADS);
+        for k in 0..self.strips.len() {
+            let (Some(strip), Some(steps_m)) = (self.strips.get(k), self.steps_m.get(first + k)) else {
+                return;
+            };
+            let perimeter_m = self.seen_alike(k).length_m;
+            let sampled = |t_y_m: f64| Sampled { target_m, t_y_m, perimeter_m };
+            let passes = [
+                sampled(steps_m[0]).passes_needed(lost(strip.seen_by)),
+                sampled(steps_m[1]).passes_needed(lost(all)),
+            ];
+            if let Some(slot) = self.needed.get_mut(first + k) {
+                *slot = passes;
+            }
+        }
+    }
+
+    /// Returns the number of passes that replace a single pass, within a strip and across it.
+    fn needed(&self, setting: usize, k: usize, thin: &Thin<'_>) -> [f64; 2] {
+        let needed = || self.needed.get(setting * self.strips.len() + k).copied();
+        if thin.is_lossy() { needed().unwrap_or([1.0; 2]) } else { [1.0; 2] }
     }
 }
 

@@ -24,7 +24,6 @@ mod advice;
 mod alerts;
 mod coverage;
 mod findings;
-mod inspection;
 mod mission;
 mod navigation;
 mod sensors;

@@ -2,13 +2,12 @@
 
 use core::cell::RefCell;
 
-use crate::Mission;
-use crate::NavigationConfig;
 use crate::advice::parse_looks;
 use crate::alerts::{AlertTiming, LimitsConfig};
 use crate::coverage::CoverageConfig;
 use crate::sensors::{self, DEGREES, SENSOR_DISTANCE_M, Sensors};
 use crate::tunnel::TunnelConfig;
+use crate::{Mission, NavigationConfig};
 use headrace_config::{ConfigError, ConfigErrors, Document, Loader, Section};
 use headrace_coverage::StoreLayout;
 use headrace_fusion::Navigation;
@@ -20,6 +19,7 @@ use headrace_sampling::advice::Looks;
 use headrace_sampling::head::{HeadProgram, HeadSpec};
 use headrace_sampling::layout::{self, HeadLayout};
 use headrace_sampling::occlusion::Obstacle;
+use headrace_sampling::plan::Inspection;
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::{CounterSpec, Device, DeviceKind, Sense};
 
@@ -185,9 +185,7 @@ impl VehicleConfig {
             attachments: Vec::new(),
         })
     }
-}
 
-impl VehicleConfig {
     /// Returns the mission parameters of this vehicle.
     pub fn mission(&self) -> Mission {
         Mission {
@@ -227,6 +225,26 @@ impl VehicleConfig {
     /// The profiling heads, in the order of the file.
     pub fn heads(&self) -> Vec<HeadSpec> {
         self.sensors.iter().filter_map(|sensor| sensor.head()).collect()
+    }
+
+    /// Returns the inspection with the heads as configured and the vehicle steady in the centre.
+    ///
+    /// Errors: no modes are known for a head's range setting.
+    pub fn inspection(&self) -> Result<Inspection, String> {
+        let heads = self.sensors.iter().filter_map(|sensor| Some((sensor.head()?, sensor.modes(None))));
+        let heads = heads.map(|(spec, modes)| Ok((spec, modes?))).collect::<Result<_, String>>()?;
+        Ok(Inspection {
+            profile: self.tunnel.profile.clone(),
+            length_m: self.tunnel.length_m,
+            place: self.tunnel.profile.reference(),
+            heads,
+            hull: self.hull.clone(),
+            layout: self.layout,
+            drift_m: 0.0,
+            yaw_rad: 0.0,
+            yaw_rate_radps: 0.0,
+            sound_speed_mps: self.site.sound_speed_mps,
+        })
     }
 }
 

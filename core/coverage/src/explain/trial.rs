@@ -1,8 +1,7 @@
 //! A section's hole with some of the present factors removed.
 
 use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_in, is_passed, is_unheard};
-use crate::cause::Cause;
-use crate::causes::Causes;
+use crate::cause::{Cause, Causes};
 use crate::frontier::Reach;
 use crate::hole::{HoleFinder, WallChanges};
 use crate::missing_samples::MissingSample;

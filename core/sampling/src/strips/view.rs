@@ -1,10 +1,110 @@
-//! The parts of the wall that one head sees.
+//! The parts of the wall that one head sees: arcs of the perimeter, and the sector of a head.
 
-use super::arc::Arc;
-use super::sector::Sector;
-use crate::ring::Ring;
+use serde::{Deserialize, Serialize};
+
+use crate::error::SamplingError;
+use crate::occlusion::AngleRange;
+use crate::ring::{Ring, Standing};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
+
+/// An interval of the perimeter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Arc {
+    /// Arc length of the start, m.
+    pub from_m: f64,
+    /// Length of the interval in the direction of growing arc length, m.
+    pub length_m: f64,
+}
+
+impl Arc {
+    /// Returns the part of the wall covered by a range of head angles.
+    ///
+    /// Errors: as for [`Standing::sounding`].
+    pub fn of(standing: &Standing<'_>, angles: &AngleRange) -> Result<Self, SamplingError> {
+        let arc_m = |angle_rad| standing.sounding(angle_rad).map(|sounding| sounding.arc_m);
+        let perimeter_m = standing.perimeter_m();
+        if angles.size_rad >= math::TAU {
+            return Ok(Self { from_m: 0.0, length_m: perimeter_m });
+        }
+        let (first, last) = (arc_m(angles.from_rad)?, arc_m(angles.from_rad + angles.size_rad)?);
+        let (middle, whole) = (
+            math::wrap(arc_m(angles.middle_rad())? - first, perimeter_m),
+            math::wrap(last - first, perimeter_m),
+        );
+        // A head that faces aft sweeps the wall in the opposite direction.
+        Ok(if middle <= whole {
+            Self { from_m: first, length_m: whole }
+        } else {
+            Self { from_m: last, length_m: perimeter_m - whole }
+        })
+    }
+
+    /// Joins this arc with the next one in the head's direction of rotation.
+    pub(super) fn on_to(&self, next: &Self, forward: bool, perimeter_m: f64) -> Self {
+        let (first, last) = if forward { (self, next) } else { (next, self) };
+        let length_m = math::wrap(last.from_m + last.length_m - first.from_m, perimeter_m);
+        Self { from_m: first.from_m, length_m }
+    }
+
+    pub(super) fn has(&self, arc_m: f64, perimeter_m: f64) -> bool {
+        math::wrap(arc_m - self.from_m, perimeter_m) <= self.length_m
+    }
+}
+
+/// Number of equal angles into which a sector is divided.
+///
+/// The longest times between passes at the two ends of a part differ by an eighth of a sweep there and back.
+pub const PARTS: usize = 8;
+
+/// Wall of a head's sector, in parts of equal angle from one turning point to the other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Sector {
+    parts: [Arc; PARTS],
+}
+
+impl Sector {
+    /// Returns the wall that a head sees between two turning points.
+    ///
+    /// `angles` are in the sensor frame of the head.
+    ///
+    /// Errors: as for [`Standing::sounding`].
+    pub fn of(standing: &Standing<'_>, angles: &AngleRange) -> Result<Self, SamplingError> {
+        let mut parts = [Arc::of(standing, angles)?; PARTS];
+        let size_rad = angles.size_rad / PARTS as f64;
+        for (k, part) in parts.iter_mut().enumerate() {
+            let from_rad = angles.from_rad + k as f64 * size_rad;
+            *part = Arc::of(standing, &AngleRange { from_rad, size_rad })?;
+        }
+        Ok(Self { parts })
+    }
+
+    /// Parts of the sector.
+    pub(super) fn parts(&self) -> impl Iterator<Item = &Arc> {
+        self.parts.iter()
+    }
+
+    /// Longest time between two passes over the part that contains this place, 0.5 to 1.
+    ///
+    /// The time is a share of a sweep there and back; `None` outside the sector. At a turning point, one pass follows
+    /// another immediately, and the next comes a whole sweep later. In the middle of the sector, passes are evenly
+    /// spaced. A circle between two legs of the zigzag is at most as wide as the legs' distance at its centre.
+    /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
+    pub(super) fn wait(&self, arc_m: f64, perimeter_m: f64) -> Option<f64> {
+        let number = self.parts.iter().position(|part| part.has(arc_m, perimeter_m))?;
+        Some((number + 1).max(PARTS - number) as f64 / PARTS as f64)
+    }
+}
+
+#[cfg(test)]
+impl Sector {
+    /// Creates a sector in the middle of a pipe, where equal angles are equal arcs.
+    pub(super) fn evenly(arc: Arc) -> Self {
+        let length_m = arc.length_m / PARTS as f64;
+        let part = |k: usize| Arc { from_m: arc.from_m + k as f64 * length_m, length_m };
+        Self { parts: core::array::from_fn(part) }
+    }
+}
 
 /// The parts of the wall that one head sees.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -54,5 +154,22 @@ impl View {
             }
             before_m = sounding.arc_m;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joined_arcs_include_the_gap_and_the_seam_between_them() {
+        let arc = |from_m: f64, length_m: f64| Arc { from_m, length_m };
+        let onward = |a: Arc, b: Arc, forward: bool| {
+            let joined = a.on_to(&b, forward, 20.0);
+            (joined.from_m, joined.length_m)
+        };
+        assert_eq!(onward(arc(10.0, 2.0), arc(15.0, 3.0), true), (10.0, 8.0));
+        assert_eq!(onward(arc(15.0, 3.0), arc(10.0, 2.0), false), (10.0, 8.0));
+        assert_eq!(onward(arc(18.0, 1.0), arc(1.0, 2.0), true), (18.0, 5.0));
     }
 }
