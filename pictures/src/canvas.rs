@@ -6,8 +6,7 @@ use headrace_geometry::math;
 use svg::node::element;
 use svg::{Document, Node};
 
-use super::colour::{BLACK, Colour, DIM, WHITE};
-use super::look::{Look, Marker};
+use super::look::{BLACK, Colour, DIM, Look, Marker, WHITE};
 use super::polyline::{self, Px};
 
 /// Default width and height of a sheet, pixels.

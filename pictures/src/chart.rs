@@ -3,10 +3,8 @@
 use headrace_geometry::math;
 
 use super::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
-use super::colour::{BLACK, Colour};
-use super::look::{AXIS, GRID, Look};
-use super::polyline::Frame;
-use super::polyline::Px;
+use super::look::{AXIS, BLACK, Colour, GRID, Look};
+use super::polyline::{Frame, Px};
 
 /// Minimum ratio of end to start for logarithmic ticks. An axis with a smaller ratio gets linear ticks.
 const SHORT: f64 = 4.0;

@@ -6,7 +6,6 @@
 pub mod canvas;
 pub mod chart;
 pub mod clock;
-pub mod colour;
 pub mod labels;
 pub mod look;
 pub mod polyline;

@@ -13,8 +13,7 @@ use datafusion::arrow::datatypes::{DataType, SchemaRef};
 use datafusion::error::DataFusionError;
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart, short};
-use headrace_pictures::colour::Colour;
-use headrace_pictures::look::of_several;
+use headrace_pictures::look::{Colour, of_several};
 use headrace_pictures::polyline::Frame;
 
 use crate::error::Error;

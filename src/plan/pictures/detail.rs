@@ -2,10 +2,8 @@
 
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart, short};
-use headrace_pictures::colour::Colour;
-use headrace_pictures::look::{self, Look};
-use headrace_pictures::polyline::Frame;
-use headrace_pictures::polyline::Px;
+use headrace_pictures::look::{self, Colour, Look};
+use headrace_pictures::polyline::{Frame, Px};
 
 use super::laid::Laid;
 

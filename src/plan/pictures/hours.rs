@@ -2,9 +2,8 @@
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart, short};
-use headrace_pictures::colour::Colour;
 use headrace_pictures::labels::{self, Label};
-use headrace_pictures::look::{self, Look};
+use headrace_pictures::look::{self, Colour, Look};
 use headrace_pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 

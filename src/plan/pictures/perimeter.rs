@@ -3,16 +3,14 @@
 use headrace_pictures::canvas::{self, Canvas, NORMAL, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart, short};
 use headrace_pictures::clock::{self, Hour};
-use headrace_pictures::colour::{BLACK, Colour, PALE};
 use headrace_pictures::labels::{self, Label};
-use headrace_pictures::look::{self, Look};
+use headrace_pictures::look::{self, BLACK, Colour, Look, PALE};
 use headrace_pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 use headrace_sampling::plan::WallPlace;
 
-use super::Shown;
-use super::modes;
 use super::wall::{self, Thin};
+use super::{Shown, modes};
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
 /// Points around the wall at which spacing is computed.

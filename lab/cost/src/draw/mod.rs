@@ -4,8 +4,7 @@ mod labels;
 mod panel;
 
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side, width_px};
-use headrace_pictures::colour::DIM;
-use headrace_pictures::look::{self, Look};
+use headrace_pictures::look::{self, DIM, Look};
 use headrace_pictures::polyline::Px;
 
 use crate::point::Trade;

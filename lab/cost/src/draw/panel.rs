@@ -4,9 +4,8 @@
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart};
-use headrace_pictures::colour::Colour;
 use headrace_pictures::labels::{self as ends, Label};
-use headrace_pictures::look::{self, Look};
+use headrace_pictures::look::{self, Colour, Look};
 use headrace_pictures::polyline::Frame;
 
 use super::labels::Taken;

@@ -3,10 +3,8 @@
 use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart};
 use headrace_pictures::clock;
-use headrace_pictures::colour::{BLACK, Colour};
-use headrace_pictures::look::{self, Look, Marker};
-use headrace_pictures::polyline::Frame;
-use headrace_pictures::polyline::Px;
+use headrace_pictures::look::{self, BLACK, Colour, Look, Marker};
+use headrace_pictures::polyline::{Frame, Px};
 
 use crate::figures::{PhaseShift, Place, Sectors, Way};
 

@@ -2,7 +2,7 @@
 
 use headrace_geometry::math;
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
-use headrace_pictures::colour::Colour;
+use headrace_pictures::look::Colour;
 use headrace_pictures::polyline::Px;
 
 /// Colours at equal intervals, from the pale end. Source: Nuñez, Anderton, Renslow, "Optimizing colormaps with

@@ -4,10 +4,8 @@ use headrace_geometry::math;
 use headrace_pictures::canvas::{BOLD, Canvas, Letters, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart};
 use headrace_pictures::clock;
-use headrace_pictures::colour::{BLACK, Colour};
-use headrace_pictures::look::{Look, Marker};
-use headrace_pictures::polyline::Frame;
-use headrace_pictures::polyline::Px;
+use headrace_pictures::look::{BLACK, Colour, Look, Marker};
+use headrace_pictures::polyline::{Frame, Px};
 
 use super::scale;
 use crate::figures::{Panel, Walls};

@@ -1,4 +1,0 @@
-//! Files named in a scene.
-
-/// Loads the content of a file named in a scene.
-pub type FileLoader<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, String>;
