@@ -3,21 +3,18 @@
 //! Only the effects that a scene names or implies are simulated. Without effects a device is ideal except for its wire
 //! format's resolution.
 
-mod adviser;
 mod builder;
 mod clock;
 pub mod effects;
 pub mod environment;
 mod error;
 mod facts;
-mod files;
 mod implied_effects;
 #[cfg(feature = "mesh")]
 pub mod mesh;
 mod motion;
 mod notes;
 mod outbox;
-mod pilot_advice;
 pub mod position_error_model;
 mod random;
 mod scene;
@@ -32,18 +29,18 @@ mod testing_motion;
 pub mod trajectory;
 mod truth;
 
-pub use adviser::Adviser;
 pub use builder::Added;
 pub use clock::START;
 pub use error::SceneError;
 pub use facts::{Facts, SensorFacts};
-pub use files::FileLoader;
 pub use implied_effects::{Called, Fate, Take};
 pub use outbox::Message;
-pub use pilot_advice::PilotAdvice;
 pub use scene::Scene;
 pub use sensing::Scenery;
-pub use simulation::Simulation;
+pub use simulation::{Adviser, Simulation};
 pub use stages::Stage;
-pub use trajectory::{Leg, Trajectory};
+pub use trajectory::{Leg, PilotAdvice, Trajectory};
 pub use truth::{Cause, SoundingTruth, TruthRow};
+
+/// Loads the content of a file named in a scene.
+pub type FileLoader<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, String>;

@@ -12,7 +12,6 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::{Emulated, EmulatorSetup, Sense};
 use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
-use crate::adviser::Adviser;
 use crate::builder::{Added, Builder, Programs};
 use crate::clock::START;
 use crate::error::SceneError;
@@ -24,6 +23,7 @@ use crate::sensing::{
     Device, Echosounder, Head, Line, Mounted, Rays, Reach, Samples, Scenery, Slice, Source,
 };
 use crate::stages::{self, AIM_HELD, Held, Stage};
+use crate::trajectory::PilotAdvice;
 use crate::truth::{self, TruthRow};
 
 /// Length of a slice. At this length, the overhead of the schedule is negligible.
@@ -35,6 +35,15 @@ const ECHOSOUNDER_REACH_M: f64 = 100.0;
 
 /// A time that is never reached.
 const NEVER: MonoNs = MonoNs(u64::MAX);
+
+/// An on-board monitor whose advice the simulated pilot follows.
+pub trait Adviser: Send {
+    /// Processes a message that has crossed its line. Messages must be passed in order of time.
+    fn hear(&mut self, message: &Message<'_>);
+
+    /// The advice since the last call, in order of time.
+    fn told(&mut self) -> Vec<PilotAdvice>;
+}
 
 /// Source of the requests to the devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,13 +1,12 @@
 //! Faults of devices.
 
-mod line;
-mod span;
-mod values;
-
+use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
-use headrace_geometry::time::DurNs;
-use headrace_sensor::device::Sense;
-use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
+use headrace_geometry::frames::Rot;
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Sense};
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use super::effect::{Effect, EffectKind};
 use super::line_delay::SENSES;
@@ -16,10 +15,9 @@ use crate::builder::Builder;
 use crate::clock::START;
 use crate::error::SceneError;
 use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::{Echosounder, Line, Samples, Scenery};
 use crate::stages::Stage;
-use line::BrokenLine;
-use span::Span;
-use values::{Jumped, Stuck};
 
 /// A device has a fault.
 ///
@@ -41,6 +39,19 @@ enum Fault {
     Jump { size: f64 },
     Die,
     Babble,
+}
+
+/// A span of time. Its end is excluded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Span {
+    from: MonoNs,
+    to: MonoNs,
+}
+
+impl Span {
+    fn holds(&self, at: MonoNs) -> bool {
+        (self.from..self.to).contains(&at)
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,15 +125,179 @@ impl Effect for PerSensor<Parameters> {
                 }
             }
         }
-        sim.system(Stage::Hear, values::stick::<Sounding>);
-        sim.system(Stage::Hear, values::jump_soundings);
-        sim.system(Stage::Feel, values::stick::<Pressure>);
-        sim.system(Stage::Feel, values::stick::<Inertia>);
-        sim.system(Stage::Feel, values::stick::<GroundVelocity>);
-        sim.system(Stage::Feel, values::stick::<Payout>);
-        sim.system(Stage::Feel, values::jump_others);
-        sim.system(Stage::Line, line::break_lines);
+        sim.system(Stage::Hear, stick::<Sounding>);
+        sim.system(Stage::Hear, jump_soundings);
+        sim.system(Stage::Feel, stick::<Pressure>);
+        sim.system(Stage::Feel, stick::<Inertia>);
+        sim.system(Stage::Feel, stick::<GroundVelocity>);
+        sim.system(Stage::Feel, stick::<Payout>);
+        sim.system(Stage::Feel, jump_others);
+        sim.system(Stage::Line, break_lines);
         Ok(())
+    }
+}
+
+/// Makes a sensor repeat its last value.
+#[derive(Component)]
+struct Stuck<M: Measurement> {
+    span: Span,
+    held: Option<M>,
+}
+
+impl<M: Measurement> Stuck<M> {
+    fn new(span: Span) -> Self {
+        Self { span, held: None }
+    }
+}
+
+/// A measurement whose value can be replaced by that of another measurement.
+trait Sticking: Measurement {
+    /// Returns this measurement with the value of `other`. Time and head angles are unchanged.
+    #[must_use]
+    fn valued(self, other: &Self) -> Self;
+}
+
+impl Sticking for Sounding {
+    fn valued(self, other: &Self) -> Self {
+        Self { range_m: other.range_m, ..self }
+    }
+}
+
+impl Sticking for Pressure {
+    fn valued(self, other: &Self) -> Self {
+        Self { at: self.at, ..*other }
+    }
+}
+
+impl Sticking for Inertia {
+    fn valued(self, other: &Self) -> Self {
+        Self { at: self.at, period: self.period, ..*other }
+    }
+}
+
+impl Sticking for GroundVelocity {
+    fn valued(self, other: &Self) -> Self {
+        Self { at: self.at, ..*other }
+    }
+}
+
+impl Sticking for Payout {
+    fn valued(self, other: &Self) -> Self {
+        Self { at: self.at, ..*other }
+    }
+}
+
+/// Repeats the last value before the span. A device that is stuck from the dive's start repeats its first value.
+fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &mut Stuck<M>)>) {
+    for (mut samples, mut stuck) in &mut devices {
+        for measured in &mut samples.list {
+            if stuck.span.holds(measured.at())
+                && let Some(held) = &stuck.held
+            {
+                *measured = measured.valued(held);
+            }
+            stuck.held = Some(*measured);
+        }
+    }
+}
+
+/// Adds a constant error to a sensor's values.
+#[derive(Component)]
+struct Jumped {
+    size: f64,
+    span: Span,
+}
+
+fn jump_soundings(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Jumped, Option<&Echosounder>)>) {
+    for (mut samples, Jumped { size, span }, echosounder) in &mut sonars {
+        for sounding in samples.list.iter_mut().filter(|sounding| span.holds(sounding.at)) {
+            if echosounder.is_some() {
+                // A range is never negative.
+                sounding.range_m = sounding.range_m.map(|range_m| (range_m + size).max(0.0));
+            } else {
+                sounding.reported_rad += size.to_radians();
+            }
+        }
+    }
+}
+
+type Others<'a> = (
+    &'a Jumped,
+    Option<&'a mut Samples<Pressure>>,
+    Option<&'a mut Samples<Inertia>>,
+    Option<&'a mut Samples<GroundVelocity>>,
+    Option<&'a mut Samples<Payout>>,
+);
+
+fn jump_others(scenery: Res<'_, Scenery>, mut sensors: Query<'_, '_, Others<'_>>) {
+    let site = &scenery.site;
+    for (Jumped { size, span }, pressures, inertias, velocities, payouts) in &mut sensors {
+        within(pressures, span, |pressure| {
+            pressure.pressure_pa = site.pressure_pa(site.depth_m(pressure.pressure_pa) + size);
+        });
+        within(inertias, span, |inertia| {
+            let (roll, pitch, yaw) = inertia.attitude.roll_pitch_yaw();
+            inertia.attitude = Rot::from_roll_pitch_yaw(roll, pitch, yaw + size.to_radians());
+        });
+        within(velocities, span, |moved| {
+            let [x, y, z] = moved.velocity_mps.0.into();
+            moved.velocity_mps = headrace_geometry::frames::Vec3::new(x + size, y, z);
+        });
+        within(payouts, span, |payout| payout.chainage_m += size);
+    }
+}
+
+fn within<M: Measurement>(
+    samples: Option<bevy_ecs::change_detection::Mut<'_, Samples<M>>>,
+    span: &Span,
+    change: impl Fn(&mut M),
+) {
+    if let Some(mut samples) = samples {
+        samples.list.iter_mut().filter(|measured| span.holds(measured.at())).for_each(change);
+    }
+}
+
+/// Makes a device's line silent, or replaces its bytes with random bytes.
+#[derive(Component)]
+struct BrokenLine {
+    span: Span,
+    /// Source of the random bytes; `None` for a silent line.
+    stream: Option<Stream>,
+    /// Number of random bytes sent so far.
+    said: u64,
+}
+
+impl BrokenLine {
+    fn silent(span: Span) -> Self {
+        Self { span, stream: None, said: 0 }
+    }
+
+    fn babbling(span: Span, stream: Stream) -> Self {
+        Self { span, stream: Some(stream), said: 0 }
+    }
+
+    fn break_line(&mut self, line: &mut Line) {
+        let Line { messages, bytes } = line;
+        let received = messages.iter_mut().filter(|message| message.direction == Direction::Received);
+        for message in received.filter(|message| self.span.holds(message.at)) {
+            let (from, to) = message.bytes;
+            let Some(stream) = self.stream else {
+                // Messages without bytes keep their indices, and the outbox drops them.
+                message.bytes = (from, from);
+                continue;
+            };
+            for byte in bytes.get_mut(from..to).unwrap_or_default() {
+                let [u, _] = stream.at(self.said).uniform();
+                *byte = u8::try_from(math::floor_to_i64(256.0 * u)).unwrap_or_default();
+                self.said += 1;
+            }
+        }
+    }
+}
+
+fn break_lines(mut lines: Query<'_, '_, (&mut Line, &mut BrokenLine)>) {
+    for (mut line, mut broken) in &mut lines {
+        broken.break_line(&mut line);
     }
 }
 

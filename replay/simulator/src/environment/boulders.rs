@@ -3,13 +3,12 @@
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
 
-use super::frame::Frame;
-use super::ground::Ground;
 use super::heaps::Heap;
 use super::keys;
-use super::placing::Placed;
+use super::placing::{Ground, Placed};
 use super::scatter::Scatter;
 use super::shapes::Solid;
+use super::vector::Frame;
 use super::widths::floor_m;
 
 /// Allowed sizes of a boulder, m.

@@ -2,10 +2,9 @@
 
 use headrace_config::{ConfigError, Section};
 
-use super::ground::Ground;
 use super::heaps::Heap;
 use super::keys::{self, Kind};
-use super::placing::Placed;
+use super::placing::{Ground, Placed};
 use super::shapes::{Hollow, Solid};
 use super::tube::Tube;
 use super::{boulders, openings};

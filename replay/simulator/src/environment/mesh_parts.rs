@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use super::face::Face;
-use super::frame::Frame;
-use super::vector::{Ray, V3};
+use super::vector::{Face, Frame, Ray, V3};
 use crate::mesh::Mesh;
 
 /// Distance by which points close to the end plane of a wall are moved into the wall, m. The mesh is open in the plane

@@ -9,12 +9,12 @@ use headrace_geometry::math;
 use headrace_geometry::tunnel::Yz;
 
 use super::bulge::Bulge;
-use super::frame::Frame;
 use super::keys::{self, Kind};
 use super::mesh_parts::{MeshBody, MeshWall};
 use super::placing::{Placed, Site, span_m};
 use super::shapes::Solid;
-use crate::files::FileLoader;
+use super::vector::Frame;
+use crate::FileLoader;
 use crate::mesh::{self, Mesh, Role};
 
 /// Allowed chainage of the origin of a mesh, m. The origin of a survey may be far away.

@@ -10,10 +10,7 @@
 mod axis;
 mod boulders;
 mod bulge;
-mod face;
 mod features;
-mod frame;
-mod ground;
 mod heaps;
 mod index;
 mod keys;
@@ -38,16 +35,14 @@ mod tube;
 mod vector;
 mod widths;
 
-use headrace_config::Loader;
-use headrace_config::{ConfigError, Section};
+use headrace_config::{ConfigError, Loader, Section};
 use headrace_geometry::frames::{Point3, Tunnel, Vec3};
 use headrace_geometry::tunnel::Profile;
 use headrace_vehicle::TunnelConfig;
 
 pub use axis::Axis;
 
-use crate::files::FileLoader;
-use face::Face;
+use crate::FileLoader;
 use features::Features;
 use index::Index;
 use placing::{Placed, Site};
@@ -55,7 +50,7 @@ use rough::Roughness;
 use shapes::{Hollow, SKIN_M, Solid};
 use stations::Scales;
 use tube::Tube;
-use vector::{Ray, V3};
+use vector::{Face, Ray, V3};
 
 /// Largest length of a ray, m.
 const FARTHEST_M: f64 = 1.0e5;

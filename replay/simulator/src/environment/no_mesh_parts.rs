@@ -1,7 +1,6 @@
 //! Replaces `mesh_parts.rs` in a build without the feature `mesh`.
 
-use super::face::Face;
-use super::vector::{Ray, V3};
+use super::vector::{Face, Ray, V3};
 
 /// A wall of triangles. This build has no values of this type.
 #[derive(Debug, Clone)]

@@ -7,7 +7,7 @@ use super::keys::{self, Kind};
 use super::mesh_parts::MeshWall;
 use super::placing::{Placed, Site};
 use super::shapes::Solid;
-use crate::files::FileLoader;
+use crate::FileLoader;
 
 /// Refuses meshes.
 ///

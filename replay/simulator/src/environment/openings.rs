@@ -3,9 +3,8 @@
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
 
-use super::ground::Ground;
 use super::keys;
-use super::placing::Placed;
+use super::placing::{Ground, Placed};
 use super::shapes::{Hollow, Ring, Solid};
 use super::widths::flat_floor_m;
 

@@ -1,9 +1,11 @@
-//! Positions of objects in the tunnel.
+//! Positions of objects in the tunnel, before and after its wall is displaced.
 
 use headrace_geometry::tunnel::Profile;
 
 use super::axis::Axis;
 use super::stations::Scales;
+use super::tube::Tube;
+use super::vector::Frame;
 
 /// Largest ratio of an object's span of chainage to its length. The ratio is largest on the inside of the tightest
 /// bend.
@@ -32,4 +34,23 @@ pub(super) struct Site<'a> {
 pub(super) fn span_m(axis: &Axis, chainage_m: f64, reach_m: [f64; 2]) -> (f64, f64) {
     let [back_m, ahead_m] = reach_m.map(|reach_m| if axis.is_straight() { reach_m } else { BEND * reach_m });
     (chainage_m + back_m, chainage_m + ahead_m)
+}
+
+/// The tunnel that features are placed in.
+#[derive(Clone, Copy)]
+pub(super) struct Ground<'a> {
+    pub(super) tube: &'a Tube,
+    pub(super) length_m: f64,
+}
+
+impl Ground<'_> {
+    /// Frame of the axis at `chainage_m`: along the tunnel, left, up. The origin is point (y, z) of the section.
+    pub(super) fn frame(&self, chainage_m: f64, [y, z]: [f64; 2]) -> Frame {
+        Frame::across(self.tube.axis().station(chainage_m), [y, z])
+    }
+
+    /// Range of chainage that lies within `reach_m` of a point of the tunnel at `chainage_m`, m.
+    pub(super) fn span_m(&self, chainage_m: f64, reach_m: f64) -> (f64, f64) {
+        span_m(self.tube.axis(), chainage_m, [-reach_m, reach_m])
+    }
 }

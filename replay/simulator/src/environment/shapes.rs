@@ -6,9 +6,9 @@
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz};
 
-use super::frame::Frame;
 #[cfg(feature = "mesh")]
 use super::mesh_parts::MeshBody;
+use super::vector::Frame;
 use super::vector::{Ray, V3, along, dot, unit};
 
 /// Largest distance between a point and a hollow at which the point counts as in the hollow, m.

@@ -16,11 +16,10 @@ use headrace_geometry::tunnel::{Profile, Yz};
 
 use super::axis::{Axis, Piece, Station};
 use super::bulge::Bulge;
-use super::face::Face;
 use super::mesh_parts::MeshWall;
 use super::stations::Scales;
 use super::steepness::Steepness;
-use super::vector::{Ray, V3, unit};
+use super::vector::{Face, Ray, V3, unit};
 use super::widths::half_width_m;
 
 /// Minimum length of a step along a ray, m.

@@ -1,6 +1,9 @@
-//! Rays, and vector operations for casting rays.
+//! Geometry of ray casting: vectors, rays, Cartesian frames, and the wall at the point where a ray meets it.
 
 use headrace_geometry::math;
+use headrace_geometry::tunnel::Yz;
+
+use super::axis::Station;
 
 /// A position or direction in the tunnel's frame, m.
 pub(super) type V3 = [f64; 3];
@@ -40,4 +43,47 @@ pub(super) fn dot(a: V3, b: V3) -> f64 {
 pub(super) fn unit(a: V3) -> V3 {
     let length = math::sqrt(dot(a, a));
     if length > 0.0 { a.map(|c| c / length) } else { a }
+}
+
+/// An origin and three orthogonal unit vectors.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    /// Origin, in the tunnel's frame.
+    pub(super) origin: V3,
+    /// Axes, in the tunnel's frame.
+    pub(super) axes: [V3; 3],
+}
+
+impl Frame {
+    /// Frame of the axis at a chainage: along the tunnel, left, up. The origin is point (y, z) of the section.
+    pub(super) fn across(station: Station, [y, z]: Yz) -> Self {
+        let ([tx, ty], [ax, ay]) = (station.tangent, station.at);
+        Self { origin: [ax - y * ty, ay + y * tx, z], axes: [[tx, ty, 0.0], [-ty, tx, 0.0], [0.0, 0.0, 1.0]] }
+    }
+
+    /// Transforms a point from the tunnel's frame into this one.
+    pub(super) fn local(&self, point: V3) -> V3 {
+        let from = sub(point, self.origin);
+        self.axes.map(|axis| dot(from, axis))
+    }
+
+    /// Transforms a ray from the tunnel's frame into this one.
+    pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
+        Ray { origin: self.local(ray.origin), direction: self.axes.map(|axis| dot(ray.direction, axis)) }
+    }
+
+    /// Transforms a direction from this frame into the tunnel's.
+    pub(super) fn outwards(&self, local: V3) -> V3 {
+        let sum = along([0.0; 3], local[0], self.axes[0]);
+        along(along(sum, local[1], self.axes[1]), local[2], self.axes[2])
+    }
+}
+
+/// The wall at one point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Face {
+    /// Unit normal, towards the water.
+    pub(super) normal: V3,
+    /// Number of the feature that displaced the wall at the point.
+    pub(super) feature: Option<u16>,
 }

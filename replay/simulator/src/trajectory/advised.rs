@@ -7,7 +7,6 @@ use super::flow::Flow;
 use super::knots::{Knots, Offsets, wandering};
 use super::place::Place;
 use crate::clock::START;
-use crate::pilot_advice::PilotAdvice;
 use crate::random::Stream;
 
 /// Time between two decisions, s.
@@ -28,6 +27,19 @@ const HOLD_S: f64 = 20.0;
 const MOST_STOOD_S: f64 = 120.0;
 /// Time that the pilot waits for further advice at the end, s.
 const WAITS_S: f64 = 10.0;
+
+/// The advice at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PilotAdvice {
+    /// Time of the advice.
+    pub at: MonoNs,
+    /// Largest speed that meets the sampling target, m/s; zero if no speed does, `None` if unknown.
+    pub v_max_mps: Option<f64>,
+    /// Whether the pilot should keep the vehicle stationary for a while.
+    pub stand: bool,
+    /// First and last chainage of each missed stretch that has not been cleared yet, m.
+    pub missed_m: Vec<[f64; 2]>,
+}
 
 /// A stretch on which the pilot is in a hurry and ignores advice.
 #[derive(Debug, Clone, Copy, PartialEq)]

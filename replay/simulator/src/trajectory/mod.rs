@@ -14,8 +14,7 @@ use advised::Advised;
 use legs::Legs;
 use pilot::Piloted;
 
-use crate::pilot_advice::PilotAdvice;
-
+pub use advised::PilotAdvice;
 pub use flow::Flow;
 pub use knots::{Knots, Offsets, wandering};
 pub use legs::Leg;

@@ -127,3 +127,24 @@ fn impossible_beams_are_refused() {
     assert!(refusal("rings = 3").contains("is not a key here"));
     assert!(refusal("sensors = [\"depth\"]").contains("this effect can act on: sonar_0"));
 }
+
+#[test]
+fn single_echo_is_found_at_its_range_and_empties_the_bins() {
+    let mut bins = Bins::new(0.02);
+    for range_m in [3.0, 3.001, 3.009, 3.010, 3.0199, 0.0, 12.5] {
+        bins.add(range_m, 0.7);
+        assert!((bins.take_surface_m().unwrap() - range_m).abs() < 1e-12, "{range_m}");
+    }
+    assert_eq!(bins.take_surface_m(), None);
+}
+
+#[test]
+fn stronger_echo_wins_and_near_echoes_merge() {
+    let mut bins = Bins::new(0.02);
+    bins.add(3.0, 1.0);
+    bins.add(4.0, 1.5);
+    assert!((bins.take_surface_m().unwrap() - 4.0).abs() < 1e-12);
+    bins.add(3.00, 1.0);
+    bins.add(3.02, 3.0);
+    assert!((bins.take_surface_m().unwrap() - 3.015).abs() < 1e-12);
+}

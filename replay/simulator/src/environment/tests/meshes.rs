@@ -228,7 +228,7 @@ fn box_of_triangles_equals_a_solid_block() {
     let environment = with(&table(&format!("{keys}yaw_deg = 30")), &[("box.ply", &file)]).unwrap();
     let (sin, cos) = math::sin_cos(30.0_f64.to_radians());
     let axes = [[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]];
-    let block = Solid::Block(frame::Frame { origin: [20.0, 0.5, 1.5], axes }, half);
+    let block = Solid::Block(vector::Frame { origin: [20.0, 0.5, 1.5], axes }, half);
     let bare = Environment::straight(circle());
     let mut lcg = Lcg(65);
     let mut met = 0;
