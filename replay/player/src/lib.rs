@@ -14,7 +14,6 @@ pub mod playback;
 pub mod player;
 pub mod record;
 pub mod regular_file;
-mod results;
 mod simulation_feed;
 pub mod smooth;
 pub mod snapshot_store;

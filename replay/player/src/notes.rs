@@ -10,9 +10,9 @@ use headrace_monitor::pilot_text::station;
 use headrace_monitor::result_stream::{RecordKind, first_record};
 use headrace_monitor::voice::{Container, Voice};
 
+use crate::log::format::{read_results, stream_of};
 use crate::log::voice::decode;
 use crate::log::{DiveLog, LogError, LogMessage, MessageKind};
-use crate::results::{read_results, stream_of};
 
 /// The notes in a log, including voice notes.
 #[derive(Debug, Default)]

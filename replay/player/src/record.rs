@@ -1,19 +1,17 @@
 //! The recorder as an outlet of the loop.
 
-use headrace_monitor::App;
 use headrace_monitor::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
 use headrace_monitor::outlet::Outlet;
 use headrace_monitor::resources::TickTime;
 use headrace_monitor::result_stream::ResultStream;
 use headrace_monitor::run::Loop;
 use headrace_monitor::view::DiveView;
-use headrace_monitor::{Plugin, PluginError};
+use headrace_monitor::{App, Plugin, PluginError};
 
 use std::cell::Cell;
 
-use crate::log::format::RESULT_PREFIX;
+use crate::log::format::{HEAD_WORDS, RESULT_PREFIX, STREAMS};
 use crate::log::{RecorderPort, ResultChannel};
-use crate::results::{HEAD_WORDS, STREAMS};
 use crate::view;
 
 /// Free bytes that the largest tick needs in the recorder's queue: packets, their headers, and the list of their
@@ -40,7 +38,7 @@ pub const QUEUE_OF_PORTS_BYTES: usize = 16 * LARGEST_TICK_BYTES;
 
 /// Name of the stream that has a record per echo.
 const ECHOES: &str = "pings";
-/// Message encoding of the result streams, see [`crate::results`].
+/// Message encoding of the result streams, see [`crate::log::format`].
 const ENCODING: &str = "headrace-trail";
 /// Returns the channels for a loop's results: first the streams, then the channels for viewers.
 pub fn result_channels() -> Vec<ResultChannel> {

@@ -6,9 +6,8 @@ use std::path::PathBuf;
 use headrace_monitor::result_stream::{Record, RecordKind, WordKind, first_record};
 use headrace_monitor::run::Loop;
 
-use crate::log::format::RESULT_PREFIX;
+use crate::log::format::{RESULT_PREFIX, STREAMS, read_results, stream_of};
 use crate::log::{DiveLog, LogError, MessageKind};
-use crate::results::{STREAMS, read_results, stream_of};
 
 /// Maximum memory of one stream's live results that wait for the replay, bytes.
 ///

@@ -35,7 +35,6 @@
 mod backlog;
 mod channels;
 mod chunk;
-mod derived_channels;
 mod digest;
 mod dive_log;
 mod error;
@@ -60,12 +59,10 @@ mod search;
 mod space;
 mod storage;
 mod trim;
-mod unzstd;
 pub mod voice;
 mod worker;
 mod writer;
 
-pub use derived_channels::{DerivedChannels, Made};
 pub use digest::{file_digest, files_digest};
 pub use dive_log::{DiveLog, DivePlace, PartFile};
 pub use error::LogError;
@@ -81,7 +78,7 @@ pub use space::LeftOut;
 pub use storage::{Disk, Storage, StoredFile};
 pub use trim::{Change, TRIMMED, Trim, Trimmed, trim};
 pub use voice::VoicePort;
-pub use worker::RecorderWorker;
+pub use worker::{DerivedChannels, Made, RecorderWorker};
 pub use writer::{LogHeader, LogWriter, PartSummary, ResultChannel, SourceInfo, Summary};
 
 #[cfg(test)]

@@ -18,7 +18,6 @@ use ringbuf::traits::Observer as _;
 use ringbuf::wrap::{Cons, Prod};
 
 use super::LogError;
-use super::derived_channels::DerivedChannels;
 use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
 use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, LinePort, Queue, State, until_stopped};
@@ -26,7 +25,7 @@ use super::recording::Recording;
 use super::rotate::{Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};
 use super::voice::VoicePort;
-use super::worker::RecorderWorker;
+use super::worker::{DerivedChannels, RecorderWorker};
 use super::writer::{Lane, LogHeader, Summary};
 
 /// Time that the thread sleeps while the queue is empty. Waking it earlier would cost the loop a system call.

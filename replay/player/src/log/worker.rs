@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
-use super::derived_channels::{DerivedChannels, Made};
 use super::fault::RecordingEvent;
 use super::queue::{ClosedWhenDropped, Dropped, Entry, Gap, LinePort, Queue, State};
 use super::recording::Recording;
@@ -23,6 +22,26 @@ const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 const DROPPED_PERIOD: Duration = Duration::from_secs(5);
 /// Maximum number of entries written in one step.
 const BATCH: usize = 256;
+
+/// A derived message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Made {
+    /// Number of the result channel for the message. The message is ignored if the log has no such channel.
+    pub channel: u16,
+    /// Log time of the message.
+    pub at: MonoNs,
+    /// Content of the message.
+    pub bytes: Vec<u8>,
+}
+
+/// Derives messages from results on the recorder's thread, so that the loop has no extra work.
+pub trait DerivedChannels: Send {
+    /// Processes a message of result channel `channel`. It is called even if the disk has no room for that message.
+    fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>);
+
+    /// Called at the end of the dive.
+    fn end(&mut self, made: &mut Vec<Made>);
+}
 
 /// A recorder without its thread. The caller runs its steps, and supplies the time.
 pub struct RecorderWorker {

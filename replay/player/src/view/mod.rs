@@ -24,7 +24,6 @@ mod messages;
 mod points;
 mod schemas;
 mod site;
-mod topic;
 mod wall;
 
 #[cfg(test)]
@@ -47,11 +46,11 @@ use self::messages::{
     Xyz, rounded,
 };
 use self::points::Points;
+use self::schemas::Topic;
 use self::site::{TUNNEL, VEHICLE, WALL};
-use self::topic::Topic;
 use self::wall::Wall;
+use crate::log::format::{STREAMS, read_results};
 use crate::log::{DerivedChannels, Made};
-use crate::results::{STREAMS, read_results};
 
 pub use schemas::channels;
 pub use site::Site;

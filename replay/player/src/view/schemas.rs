@@ -1,4 +1,4 @@
-//! The channels of a view, and their schemas.
+//! The topics of a view, their channels and their schemas.
 //!
 //! Names and keys of `foxglove.*` are those of Foxglove's published JSON Schemas (docs.foxglove.dev, "Message
 //! schemas"). Only features that viewers' schema parsers support are used. `type` is one word, and there are no
@@ -7,9 +7,37 @@
 
 use serde_json::{Value, json};
 
-use super::topic::Topic;
 use crate::log::ResultChannel;
 use crate::log::format::VIEW_PREFIX;
+
+/// The topics, in the order of their channels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Topic {
+    Transforms,
+    Pose,
+    Vehicle,
+    Points,
+    Wall,
+    Sections,
+    Missed,
+    Advice,
+    Alerts,
+}
+
+impl Topic {
+    /// All topics, in the order of their channels.
+    pub(super) const ALL: [Self; 9] = [
+        Self::Transforms,
+        Self::Pose,
+        Self::Vehicle,
+        Self::Points,
+        Self::Wall,
+        Self::Sections,
+        Self::Missed,
+        Self::Advice,
+        Self::Alerts,
+    ];
+}
 
 /// Returns the channels of a view. Their numbers follow those of the result streams.
 pub fn channels() -> Vec<ResultChannel> {
