@@ -13,7 +13,7 @@ use crate::format::Format;
 use crate::input::{Input, Source};
 use crate::losses::Losses;
 use crate::order::Order;
-use crate::taker::Taker;
+use crate::routing::Taker;
 
 /// Log time of a file's first entry. A simulated dive begins at the same log time.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);

@@ -24,7 +24,6 @@ mod order;
 pub mod ping;
 pub mod ros;
 pub mod routing;
-mod taker;
 #[cfg(test)]
 mod tests;
 pub mod tlog;
@@ -36,4 +35,4 @@ pub use import::{BEGIN, Import, Imported};
 pub use input::{Input, Source};
 pub use kind::FileKind;
 pub use order::Order;
-pub use taker::Taker;
+pub use routing::Taker;

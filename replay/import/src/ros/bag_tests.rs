@@ -131,3 +131,14 @@ proptest! {
         drop(Bag::topics("bag", Cursor::new(&mixed)));
     }
 }
+
+#[test]
+fn chunks_of_another_length_than_stated_are_refused() {
+    assert_eq!(unpack(b"none", b"abc", 3, false), Unpacked::Whole(b"abc".to_vec()));
+    assert!(matches!(unpack(b"none", b"abc", 4, false), Unpacked::Bad(_)));
+    assert_eq!(unpack(b"none", b"abc", 4, true), Unpacked::Cut(b"abc".to_vec()));
+    assert!(matches!(unpack(b"none", b"abc", u32::MAX, true), Unpacked::Bad(_)));
+    for packing in [b"bz2", b"lz4", b"zst"] {
+        assert!(matches!(unpack(packing, b"nothing of the kind", 3, false), Unpacked::Bad(_)));
+    }
+}

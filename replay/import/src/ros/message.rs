@@ -5,8 +5,7 @@
 
 use headrace_sensor::device::Sense;
 
-use super::points::{Beams, cloud, points, scan};
-use super::ranges::heard;
+use super::points::{Beams, cloud, heard, points, scan};
 use super::wire::{Encoding, Header, Wire};
 
 /// A type of message.

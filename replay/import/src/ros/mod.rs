@@ -10,9 +10,6 @@ mod matching;
 pub mod mcap;
 mod message;
 mod points;
-mod ranges;
-mod stated;
-mod unpack;
 mod wire;
 
 use std::collections::BTreeMap;

@@ -8,7 +8,6 @@
 
 use headrace_geometry::math;
 
-use super::ranges::heard;
 use super::wire::Wire;
 
 /// Maximum number of beams in a head's turn.
@@ -17,6 +16,16 @@ const MOST_BEAMS: usize = 1 << 16;
 const LONGEST_S: f64 = 120.0;
 /// Maximum distance of a point from the beam's plane, as a share of the point's range.
 const OFF_PLANE: f64 = 0.1;
+
+/// Interprets a range by REP 117; `None` without an echo.
+///
+/// The sender writes infinity if nothing was in range or the target was too near, and NaN if nothing was measured. A
+/// range outside the stated limits is invalid, unless the limits themselves are invalid.
+pub(super) fn heard(range_m: f64, least_m: f64, most_m: f64) -> Option<f64> {
+    let limited = most_m > 0.0 && least_m <= most_m;
+    let within = !limited || (least_m..=most_m).contains(&range_m);
+    (range_m.is_finite() && range_m > 0.0 && within).then_some(range_m)
+}
 
 /// A beam of a head.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -260,11 +269,9 @@ pub(super) fn cloud(wire: &mut Wire<'_>, stamp_ns: u64) -> Option<Result<Beams, 
 
 #[cfg(test)]
 mod tests {
-    use core::f64::consts::FRAC_PI_2;
-
-    use headrace_geometry::frames::head_direction;
-
     use super::*;
+    use core::f64::consts::FRAC_PI_2;
+    use headrace_geometry::frames::head_direction;
 
     #[test]
     fn points_are_converted_to_beam_angles_of_the_head() {
@@ -286,5 +293,16 @@ mod tests {
         let all = [[3.0, 0.0, 1.0], [0.0, f64::NAN, 1.0], [0.0; 3], [0.0, 1.0, 1.0]];
         let told = Beams::Points(all.map(|point| (point, 0.0)).to_vec()).told(Plane::Yz).unwrap();
         assert_eq!((told.beams.len(), told.off_plane, told.nowhere), (1, 1, 2));
+    }
+
+    #[test]
+    fn ranges_are_interpreted_by_rep_117() {
+        assert_eq!(heard(2.0, 0.5, 5.0), Some(2.0));
+        for none in [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 0.4, 5.1, 0.0, -1.0] {
+            assert_eq!(heard(none, 0.5, 5.0), None, "{none}");
+        }
+        assert_eq!(heard(7.0, 0.0, 0.0), Some(7.0), "limits of zero mean no limits");
+        assert_eq!(heard(7.0, 0.0, f64::INFINITY), Some(7.0));
+        assert_eq!(heard(7.0, f64::NAN, f64::NAN), Some(7.0));
     }
 }
