@@ -1,11 +1,11 @@
 //! The command line.
 
 mod common_options;
-mod external_commands;
 mod logs;
 mod page;
 mod value_parsers;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -16,16 +16,16 @@ use headrace_sensor::connect::Connect;
 use tracing::level_filters::LevelFilter;
 
 use crate::watch::Show;
-pub(crate) use common_options::{Completions, Man, Overwrite, Threads};
-pub(crate) use external_commands::ExternalArguments;
-pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
-pub(crate) use page::PageArgs;
-pub(crate) use value_parsers::{Speed, speed, time};
 
 use value_parsers::{
     address, chainage, drift, hours, layout, length, place, rotation, seconds, seconds_range, section,
     sound_speed, speed_mps, target, udp_address, yaw,
 };
+
+pub(crate) use common_options::{Completions, Man, Overwrite, Threads};
+pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
+pub(crate) use page::PageArgs;
+pub(crate) use value_parsers::{Speed, speed, time};
 
 /// Commands of `replay --interactive`.
 pub(crate) const COMMANDS: &str =
@@ -166,7 +166,7 @@ pub(crate) enum Command {
     Plan(Plan),
     /// Measure the cost of accuracy: errors against independent values, setting by setting, next to CPU time
     /// or hours.
-    #[command(disable_help_flag = true, after_help = external_commands::COST)]
+    #[command(disable_help_flag = true, after_help = COST_HELP)]
     Cost(ExternalArguments),
     /// Estimate mounts, zeros and latencies of the sensors from a log, as values for the vehicle file.
     ///
@@ -201,11 +201,11 @@ pub(crate) enum Command {
     )]
     Check(Check),
     /// Query hundreds of dives in SQL, each replayed once.
-    #[command(disable_help_flag = true, after_help = external_commands::CAMPAIGN)]
+    #[command(disable_help_flag = true, after_help = CAMPAIGN_HELP)]
     Campaign(ExternalArguments),
     /// Replay a share of a folder's dives and keep their tables as Parquet, for Slurm, Nextflow or CI
     /// matrices.
-    #[command(disable_help_flag = true, after_help = external_commands::CAMPAIGN)]
+    #[command(disable_help_flag = true, after_help = CAMPAIGN_HELP)]
     Batch(ExternalArguments),
     /// Write the shell completions of this command line to stdout.
     #[command(
@@ -585,3 +585,17 @@ impl Output {
 }
 
 const SPEED_HELP: &str = "Playback speed relative to real time, or max";
+
+/// Help on the program for campaigns.
+const CAMPAIGN_HELP: &str = "Done by the program headrace-campaign; it is built in lab/: cargo build --release -p headrace_campaign. \
+docs/how-to/replay-many-dives.md is its manual, --help lists its options.";
+/// Help on the program for costs.
+const COST_HELP: &str = "Done by the program headrace-cost; it is built in lab/: cargo build --release -p headrace_cost. docs/why/cost shows \
+what it finds, --help lists its options.";
+
+#[derive(Debug, Args)]
+pub(crate) struct ExternalArguments {
+    /// Arguments passed to that program.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
+    pub(crate) arguments: Vec<OsString>,
+}

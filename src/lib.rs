@@ -22,7 +22,6 @@ mod foxglove_live;
 pub mod import;
 mod interrupt;
 mod inventory;
-pub mod line_record;
 mod live;
 mod logging;
 mod manual;
@@ -47,7 +46,6 @@ mod simulate;
 mod smooth;
 mod summary;
 mod terminal;
-mod transient;
 mod trim;
 mod tui;
 mod vehicle_file;
@@ -58,6 +56,8 @@ use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _};
+
+pub use recordings::InRecordings;
 
 use cli::{Cli, Command};
 

@@ -16,7 +16,6 @@ use tracing_subscriber::prelude::*;
 
 use crate::cli::Verbosity;
 use crate::terminal;
-use crate::transient;
 
 /// Environment variable that filters by crate or module.
 const VARIABLE: &str = "RUST_LOG";
@@ -190,7 +189,7 @@ fn write_now(bytes: &[u8]) {
         }
     }
     let mut stderr = io::stderr().lock();
-    let cleared = if terminal::of(&stderr).overwrites && transient::take() {
+    let cleared = if terminal::of(&stderr).overwrites && terminal::take_transient() {
         stderr.write_all(terminal::CLEAR.as_bytes())
     } else {
         Ok(())

@@ -14,7 +14,6 @@ use rustix::event::{PollFd, PollFlags, poll};
 
 use crate::failure::Failure;
 use crate::terminal;
-use crate::transient;
 
 /// Time for which a live dive waits while nobody reads stdout.
 pub(crate) const UNREAD_FOR: Duration = Duration::from_secs(2);
@@ -212,7 +211,7 @@ pub(crate) fn say(text: &str) {
 
 /// Writes a line in place of a transient one. May be called from any thread.
 pub(crate) fn aside(text: &str) {
-    let clear = if transient::take() { terminal::CLEAR } else { "" };
+    let clear = if terminal::take_transient() { terminal::CLEAR } else { "" };
     put(&format!("{clear}{}\n", one_line(text)));
 }
 

@@ -6,7 +6,7 @@ use std::thread::{self, JoinHandle};
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 
 use crate::output::{UNREAD_FOR, give_up, put_waiting};
-use crate::{terminal, transient};
+use crate::terminal;
 
 /// Maximum number of lines that wait. A dive has about one line a second, and a few for each stretch.
 const WAITING: usize = 1 << 10;
@@ -102,7 +102,7 @@ fn print(messages: &Receiver<Message>) {
     let mut has_status = false;
     let close = |has_status: &mut bool| {
         // If a log message has cleared the status line already, there is nothing to clear.
-        if core::mem::take(has_status) && transient::take() {
+        if core::mem::take(has_status) && terminal::take_transient() {
             put_waiting(terminal::CLEAR);
         }
     };
@@ -114,7 +114,7 @@ fn print(messages: &Receiver<Message>) {
             }
             Message::Status(text) => {
                 put_waiting(&format!("{}{text}", terminal::CLEAR));
-                transient::shown();
+                terminal::note_transient();
                 has_status = true;
             }
         }

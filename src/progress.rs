@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 use headrace_config::plain::one_line;
 
 use crate::terminal;
-use crate::transient;
 
 const AFTER: Duration = Duration::from_secs(2);
 const EVERY: Duration = Duration::from_millis(200);
@@ -85,14 +84,14 @@ impl Progress {
         if written.and_then(|()| stderr.flush()).is_err() {
             self.terminal = false;
         }
-        transient::shown();
+        terminal::note_transient();
         self.shown = Some(self.started + self.started.elapsed());
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if self.shown.is_some() && transient::take() {
+        if self.shown.is_some() && terminal::take_transient() {
             // A closed terminal needs no clearing.
             write!(io::stderr(), "{}", terminal::CLEAR).ok();
         }

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use headrace_geometry::time::DurNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::report::{LogReport, Report};
+use headrace_ports::LineRecord;
 use headrace_replay::log::{
     LeftOut, LinePort, RecorderHandle, RecordingEvent, RecordingFault, Summary, VoicePort,
 };
@@ -152,4 +153,22 @@ fn fault(fault: &RecordingFault) -> String {
 fn left_out(left: LeftOut) -> String {
     let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
     format!("{}{}", left.words(), span.unwrap_or_default())
+}
+
+/// All recordings of a dive, for traffic on devices' lines that doesn't reach the loop.
+pub struct InRecordings(pub Vec<LinePort>);
+
+impl LineRecord for InRecordings {
+    fn sent(&self, sensor: usize, at: MonoNs, bytes: &[u8]) {
+        self.0.iter().for_each(|port| port.sent(source(sensor), at, bytes));
+    }
+
+    fn lost(&self, sensor: usize, from: MonoNs, to: MonoNs, packets: u64) {
+        self.0.iter().for_each(|port| port.lost(source(sensor), from, to, packets));
+    }
+}
+
+/// Number of a sensor's source in the log.
+fn source(sensor: usize) -> u16 {
+    u16::try_from(sensor).unwrap_or(u16::MAX)
 }

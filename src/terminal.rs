@@ -65,6 +65,20 @@ pub(crate) fn is_verbose() -> bool {
     VERBOSE.load(Ordering::Relaxed)
 }
 
+/// Whether the last line is transient, such as progress or the dive's state. It has no line end, and a log message of
+/// any thread clears it first.
+static TRANSIENT: AtomicBool = AtomicBool::new(false);
+
+/// Sets the flag, after a transient line was written.
+pub(crate) fn note_transient() {
+    TRANSIENT.store(true, Ordering::Relaxed);
+}
+
+/// Returns whether a transient line is shown, and resets the flag.
+pub(crate) fn take_transient() -> bool {
+    TRANSIENT.swap(false, Ordering::Relaxed)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

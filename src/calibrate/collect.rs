@@ -1,6 +1,9 @@
-//! Collects the readings of a part of a log, as the loop decodes them.
+//! Collects the readings of a part of a log, as the loop decodes them: the input data of the calibration.
 
+use headrace_fusion::filter::settings::Settings;
+use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
 use headrace_monitor::messages::Event;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::run::Loop;
@@ -131,4 +134,32 @@ pub(crate) fn collect(
     })?;
     let last = events.last().map_or(from, |event| event.received + DurNs(1));
     Ok(Collected { first, from, to: to.min(last.max(from)), at_surface, sensors, events })
+}
+
+/// Readings of a log, with the sensors and settings that the vehicle file describes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Material<'a> {
+    /// Design profile.
+    pub(crate) profile: &'a Profile,
+    /// Water and location, from the vehicle file.
+    pub(crate) site: Site,
+    /// Noise settings of the sensors.
+    pub(crate) settings: Settings,
+    /// The sensors of the vehicle file, by source.
+    pub(crate) sensors: &'a [SensorInfo],
+    /// All readings, in the order in which the loop processed them.
+    pub(crate) events: &'a [Event],
+}
+
+impl<'a> Material<'a> {
+    /// Readings received from `from` until before `to`, each with its sensor.
+    pub(crate) fn during(
+        &self,
+        from: MonoNs,
+        to: MonoNs,
+    ) -> impl Iterator<Item = (&'a Event, &'a SensorInfo)> {
+        let sensors = self.sensors;
+        let within = self.events.iter().filter(move |event| event.received >= from && event.received < to);
+        within.filter_map(move |event| sensors.get(event.source.index()).map(|sensor| (event, sensor)))
+    }
 }

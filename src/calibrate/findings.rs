@@ -5,10 +5,9 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
 
-use crate::calibrate::collect::Collected;
+use crate::calibrate::collect::{Collected, Material};
 use crate::calibrate::estimate::NotEstimated;
 use crate::calibrate::heads::{Heads, heads};
-use crate::calibrate::material::Material;
 use crate::calibrate::still::longest;
 use crate::calibrate::timing::{Lag, lags};
 use crate::calibrate::zero::{self, Zero};

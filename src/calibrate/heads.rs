@@ -1,9 +1,9 @@
 //! Estimates the mounts of the heads. Their turns are used while the vehicle stands still in a tunnel of
 //! known profile.
 
+use crate::calibrate::collect::Material;
 use crate::calibrate::estimate::{Estimate, NotEstimated, median};
 use crate::calibrate::fit::{ANGLE_SD_RAD, COMMON, Fit, OFFSET_SD_M, OWN, Problem, is_outlier, moved, own};
-use crate::calibrate::material::Material;
 use crate::calibrate::scan::{HeadScan, Scan, gather};
 use crate::calibrate::still::{Still, longest};
 use headrace_fusion::section::{Echo, settle};

@@ -10,7 +10,6 @@ mod estimate;
 mod findings;
 mod fit;
 mod heads;
-mod material;
 mod scan;
 mod still;
 mod table;

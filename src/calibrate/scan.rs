@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::calibrate::collect::Material;
 use crate::calibrate::estimate::{NotEstimated, median};
-use crate::calibrate::material::Material;
 use crate::calibrate::still::Still;
 use headrace_fusion::filter::updates::in_tunnel;
 use headrace_geometry::frames::{Body, Mount, Rot, Tunnel};

@@ -4,8 +4,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::calibrate::collect::Material;
 use crate::calibrate::estimate::{NotEstimated, median};
-use crate::calibrate::material::Material;
 use headrace_fusion::filter::state::rotation_vector;
 use headrace_geometry::frames::{Rot, Sensor};
 use headrace_geometry::time::{DurNs, MonoNs};

@@ -3,8 +3,8 @@
 //! The filter runs with one source's timestamps shifted. The best shift makes all innovations together most
 //! likely.
 
+use crate::calibrate::collect::Material;
 use crate::calibrate::estimate::{Estimate, NotEstimated};
-use crate::calibrate::material::Material;
 use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::{Navigation, Times};
 use headrace_geometry::math;

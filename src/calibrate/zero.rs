@@ -1,8 +1,8 @@
 //! Zeros of depth sensors and cable counters.
 
+use crate::calibrate::collect::Material;
 use crate::calibrate::estimate::{Estimate, NotEstimated, median};
 use crate::calibrate::heads::Heads;
-use crate::calibrate::material::Material;
 use crate::calibrate::still::Still;
 use headrace_fusion::filter::measure::with_quantum;
 use headrace_fusion::filter::updates::in_tunnel;

@@ -1,11 +1,12 @@
 //! `headrace devices`: lists attached devices and permissions, and with `--probe` their answers.
 
-mod probing;
 mod state;
 mod text;
 
-use headrace_ports::{Machine, OpenError, Presence, discover, presence};
+use headrace_devices::KINDS;
+use headrace_ports::{Found, Machine, OpenError, Presence, discover, presence};
 use headrace_sensor::connect::Connect;
+use headrace_sensor::driver::{Carrier, Probe};
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Devices;
@@ -13,7 +14,7 @@ use crate::failure::Failure;
 use crate::live;
 use crate::output::{deliver, show};
 use crate::vehicle_file;
-use state::{Inventory, Sensor, State};
+use state::{Inventory, Probed, Sensor, State};
 
 /// Lists the attached devices.
 ///
@@ -23,11 +24,11 @@ pub(crate) fn devices(args: &Devices) -> Result<u8, Failure> {
     let vehicle = args.vehicle.as_ref().map(|path| vehicle_file::read(path)).transpose()?;
     let found = discover(&machine);
     let found = found.into_iter().map(|found| {
-        let probed = args.probe.then(|| probing::port(&found)).flatten();
+        let probed = args.probe.then(|| probe_port(&found)).flatten();
         (found, probed)
     });
     let found = found.collect();
-    let addresses = args.address.iter().map(|connect| (connect.clone(), probing::address(connect)));
+    let addresses = args.address.iter().map(|connect| (connect.clone(), probe_address(connect)));
     let addresses = addresses.collect();
     let sensors = vehicle.map(|(_, vehicle)| sensors(&machine, &vehicle, args.probe));
     let inventory = Inventory { found, addresses, sensors };
@@ -43,13 +44,13 @@ fn sensors(machine: &Machine, vehicle: &VehicleConfig, probe: bool) -> Vec<Senso
     let connections = live::connections(vehicle).into_iter().zip(&vehicle.sensor_configs);
     let sensors = connections.map(|((id, connect), config)| {
         let state = connect.map_err(|error| OpenError::unusable(&error)).and_then(|connect| {
-            let kind = probing::kind(&config.plugin).filter(|_| probe);
+            let kind = probe_of(&config.plugin).filter(|_| probe);
             match presence(machine, &connect)? {
                 Presence::There(name) => Ok(State::Present(name)),
                 // The device sends to a port of this machine, so it can't be probed.
                 Presence::Elsewhere if matches!(connect, Connect::UdpListen { .. }) => Ok(State::NotProbed),
                 Presence::Elsewhere => match kind {
-                    Some(probe) => headrace_ports::probe(&connect, &mut [probe]).map(State::Answered),
+                    Some(kind) => headrace_ports::probe(&connect, &mut [kind]).map(State::Answered),
                     None => Ok(State::NotProbed),
                 },
             }
@@ -57,4 +58,28 @@ fn sensors(machine: &Machine, vehicle: &VehicleConfig, probe: bool) -> Vec<Senso
         Sensor { id: id.to_owned(), connect: config.connect.clone(), state }
     });
     sensors.collect()
+}
+
+/// All probes, in the order in which they are used.
+fn all_probes() -> Vec<Box<dyn Probe>> {
+    KINDS.iter().filter_map(|kind| kind.probe()).collect()
+}
+
+/// Probe of a device kind by its name in vehicle files; `None` if the kind has no probe.
+fn probe_of(name: &str) -> Option<Box<dyn Probe>> {
+    KINDS.iter().find(|kind| kind.name() == name)?.probe()
+}
+
+/// Probes a serial port that may be opened; `None` for other ports.
+fn probe_port(found: &Found) -> Option<Probed> {
+    if found.carrier != Carrier::Serial || !found.troubles.is_empty() {
+        return None;
+    }
+    let connect = Connect::parse(found.connect.as_ref()?).ok()?;
+    Some(probe_address(&connect))
+}
+
+/// Probes an address.
+fn probe_address(connect: &Connect) -> Probed {
+    headrace_ports::probe(connect, &mut all_probes())
 }

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use headrace::line_record::InRecordings;
+use headrace::InRecordings;
 use headrace_config::Document;
 use headrace_devices::KINDS;
 use headrace_geometry::time::DurNs;

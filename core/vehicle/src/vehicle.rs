@@ -2,12 +2,13 @@
 
 use core::cell::RefCell;
 
+use crate::Mission;
+use crate::NavigationConfig;
 use crate::advice::parse_looks;
 use crate::alerts::{AlertTiming, LimitsConfig};
 use crate::coverage::CoverageConfig;
 use crate::sensors::{self, DEGREES, SENSOR_DISTANCE_M, Sensors};
 use crate::tunnel::TunnelConfig;
-use crate::{Mission, NavigationConfig};
 use headrace_config::{ConfigError, ConfigErrors, Document, Loader, Section};
 use headrace_coverage::StoreLayout;
 use headrace_fusion::Navigation;

@@ -63,7 +63,7 @@ fn wall_of_another_shape_contradicts_the_profile() {
     let stand = Stand::new(shapes::rectangle(6.0, 5.0).unwrap(), &[Wrong::default(); 2], 1);
     let other = shapes::circle(3.6).unwrap();
     let why = stand.ask(|material| {
-        heads(&super::super::material::Material { profile: &other, ..*material }).unwrap_err()
+        heads(&super::super::collect::Material { profile: &other, ..*material }).unwrap_err()
     });
     assert!(matches!(why, NotEstimated::Contradicted { median_m, .. } if median_m > 0.15), "{why}");
 }

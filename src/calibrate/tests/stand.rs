@@ -1,6 +1,6 @@
 //! A simulated vehicle at rest in a tunnel, and its sensors' readings, computed from rays of the profile.
 
-use super::super::material::Material;
+use super::super::collect::Material;
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};

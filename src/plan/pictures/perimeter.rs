@@ -9,8 +9,9 @@ use headrace_pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 use headrace_sampling::plan::WallPlace;
 
+use super::Shown;
+use super::modes;
 use super::wall::{self, Thin};
-use super::{Shown, modes};
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
 /// Points around the wall at which spacing is computed.

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use headrace::line_record::InRecordings;
+use headrace::InRecordings;
 use headrace_config::Document;
 use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};

@@ -1,7 +1,5 @@
 //! `headrace import`: converts a foreign log to a headrace log.
 
-mod ros;
-
 use std::cell::Cell;
 use std::fs::File;
 use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom};
@@ -13,6 +11,7 @@ use headrace_config::Document;
 use headrace_import::csv::Csv;
 use headrace_import::ros::bag::Bag;
 use headrace_import::ros::mcap::Mcap;
+use headrace_import::ros::{Feeds, MatchError, Topic};
 use headrace_import::{
     BEGIN, FileKind, Format, Import, ImportError, Imported, Input, Source, Taker, detect, routing,
 };
@@ -61,7 +60,7 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     let vehicle = vehicle.as_ref().map(|(_, vehicle)| vehicle);
     if kind == FileKind::Mcap {
         let recording = Mcap::open(&name, file).map_err(|error| unusable(&args.file, error))?;
-        let feeds = ros::feeds(args, vehicle, &recording.topics())?;
+        let feeds = feeds(args, vehicle, &recording.topics())?;
         return write(args, kind, recording.feeding(feeds), header, &mut takers, &read);
     }
     let format = format(kind, args, vehicle)?;
@@ -135,7 +134,7 @@ fn format(
         let file = files::open(&args.file)?;
         let topics = Bag::topics(&args.file.display().to_string(), file)
             .map_err(|error| unusable(&args.file, error))?;
-        return Ok(Box::new(Bag::new(ros::feeds(args, vehicle, &topics)?)));
+        return Ok(Box::new(Bag::new(feeds(args, vehicle, &topics)?)));
     }
     let (Some(map), Some(vehicle)) = (&args.map, vehicle) else {
         let what = "import: CSV needs --vehicle VEHICLE.toml, to encode values for its sensors";
@@ -247,4 +246,31 @@ fn front_of(path: &Path) -> Result<Vec<u8>, Failure> {
     let mut file = files::open(path)?.take(detect::ENOUGH_BYTES as u64);
     file.read_to_end(&mut front).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
     Ok(front)
+}
+
+/// Assignment of topics to sensors.
+///
+/// It comes from the mapping file. Without such a file, unambiguous matches are used and listed on stderr.
+fn feeds(args: &cli::Import, vehicle: Option<&VehicleConfig>, topics: &[Topic]) -> Result<Feeds, Failure> {
+    let Some(vehicle) = vehicle else {
+        let what = "import: ROS recordings need --vehicle VEHICLE.toml, to encode values for its sensors";
+        return Err(Failure::Usage(what.to_owned()));
+    };
+    let Some(map) = &args.map else {
+        let feeds = Feeds::matching(vehicle, topics).map_err(|error| unmatched(args, error))?;
+        for matched in feeds.matched() {
+            complain(&format!("headrace: {matched}"));
+        }
+        return Ok(feeds);
+    };
+    let (text, name) = (files::read(map)?, map.display().to_string());
+    let mapping = Document::new(&name, &text).root()?;
+    Feeds::mapped(&mapping, vehicle, topics).map_err(|error| unmatched(args, error))
+}
+
+fn unmatched(args: &cli::Import, error: MatchError) -> Failure {
+    match error {
+        MatchError::Mapping(error) => error.into(),
+        error => Failure::Usage(format!("importing {}: {error}", args.file.display())),
+    }
 }
