@@ -1,9 +1,8 @@
-//! The inspection to plan, from a vehicle file or from options alone.
+//! The inspection to plan, from a vehicle file or from options alone, and the results of its planning.
 
 use std::path::{Path, PathBuf};
 
-use headrace_config::Document;
-use headrace_config::Loader;
+use headrace_config::{Document, Loader};
 use headrace_devices::KINDS;
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::site::Site;
@@ -12,7 +11,7 @@ use headrace_sampling::head::{HeadMode, HeadSpec};
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::margin::ExpectedErrors;
 use headrace_sampling::occlusion::Obstacle;
-use headrace_sampling::plan::{Inspection, Question};
+use headrace_sampling::plan::{Answer, Briefing, InLine, Inspection, Planner, Question};
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::Device;
 use headrace_simulator::position_error_model;
@@ -205,4 +204,29 @@ fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
         heads.pop().map(|head| (id, head)).ok_or_else(|| Failure::Usage("plan: no head".to_owned()))
     };
     (0..args.heads).map(head).collect()
+}
+
+/// Results of one planning run, with its input.
+pub(super) struct Findings {
+    pub(super) planner: Planner,
+    /// Ids of the heads.
+    pub(super) heads: Vec<String>,
+    pub(super) tunnel: String,
+    /// Range setting, m.
+    pub(super) range_m: f64,
+    /// Shortest and longest part of the perimeter that a beam covers, m.
+    pub(super) footprints_m: [f64; 2],
+    pub(super) question: Question,
+    pub(super) answers: Vec<Answer>,
+    /// Mode for the briefing and the charts, with its speed, m/s; `None` if no mode gives a speed.
+    pub(super) shown: Option<(usize, f64)>,
+    pub(super) briefing: Briefing,
+    /// Gain in speed with heads in line, if it is worth reporting.
+    pub(super) in_line: Option<InLine>,
+}
+
+/// A speed rounded down to 1 mm/s for printing, m/s. The printed speed thus meets the target, too.
+pub(super) fn printed_mps(speed_mps: f64) -> f64 {
+    let down = (speed_mps * 1000.0 + 1e-6).floor() / 1000.0;
+    if down > 0.0 { down } else { speed_mps }
 }

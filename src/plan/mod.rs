@@ -2,8 +2,6 @@
 
 mod case;
 mod csv;
-mod findings;
-mod lines;
 mod pictures;
 mod table;
 
@@ -18,8 +16,7 @@ use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say, show};
 use crate::outputs::{self, Claims, Kind, PICTURE};
-use case::Case;
-use findings::{Findings, printed_mps};
+use case::{Case, Findings, printed_mps};
 use pictures::Shown;
 
 /// `headrace plan`.
@@ -37,7 +34,7 @@ pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
         draw(&findings, folder)?;
     }
     if args.write {
-        deliver(lines::lines(&findings, args)?.trim_end())?;
+        deliver(table::lines(&findings, args)?.trim_end())?;
     } else if args.json {
         deliver(&serde_json::to_string_pretty(&json(&findings))?)?;
     } else if args.csv {
