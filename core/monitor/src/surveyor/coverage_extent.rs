@@ -5,7 +5,6 @@
 
 use super::heads::Heads;
 use super::survey::Requests;
-use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
 use crate::resources::{Coverage, TunnelDesign};
 use headrace_coverage::{HeadReach, Reach};
 use headrace_geometry::time::MonoNs;
