@@ -114,9 +114,6 @@ impl Watch {
             Notice::Section { at, .. } | Notice::Run { at, .. } | Notice::Listed { at, .. } => *at,
             Notice::Advice(entry) => entry.at,
             Notice::Note(note) => note.at,
-            Notice::Alert(kind, source) => {
-                dive.view().alerts().get(*kind, *source).map_or(MonoNs(0), |a| a.since)
-            }
         };
         let mut told = Vec::new();
         self.teller.hear(notice, dive, &mut |one| told.push(one));

@@ -9,6 +9,7 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::console::Who;
+pub use super::observations::Occurrences;
 use super::pilot_text::{AdviceFigures, CauseFigures};
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;
@@ -27,7 +28,7 @@ pub mod texts;
 mod timer;
 
 pub(super) use conditions::Beat;
-pub use json::{AlertCountsJson, LeftJson, ListedAlertJson, NoteJson, SpokenJson};
+pub use json::{AlertCountsJson, LeftJson, ListedAlertJson, NoteJson, SettingJson, SpokenJson};
 pub use kind::{AlertClass, ListKind, Priority};
 pub(super) use life_cycle::Telling;
 pub(super) use runs::RunInput;
@@ -111,10 +112,10 @@ pub enum Figures {
     MissingRequirement(NoFix),
     /// Position error, m, and whether staying stationary would reduce it.
     Error(f64, bool),
-    /// Alert about the dive as a whole: place, m, and largest deviation, m.
-    Deviation(f64, f64),
-    /// A doubtful setting, and the place where the doubt arose, m.
-    Setting(SettingDoubt, f64),
+    /// Observation about the dive as a whole.
+    Deviation(Occurrences),
+    /// A doubtful setting.
+    Setting(SettingDoubt, Occurrences),
     /// Remaining amount: m, seconds or percent.
     Left(f64),
 }

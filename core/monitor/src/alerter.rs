@@ -114,7 +114,7 @@ impl Alerter {
             unsure: standing.unsure,
             passed: standing.passed,
             back_to_m: standing.back_to_m,
-            alerts: standing.alerts,
+            observations: standing.observations,
             turning: source_bits(self.heads.iter().copied(), turning),
             hung: doubts.hung,
             deaf: source_bits(self.heads.iter().copied(), situation.deaf),
@@ -175,7 +175,7 @@ fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &
         .integer(why)
         .integer(from.cast_unsigned())
         .integer(to.cast_unsigned())
-        .integer(state.alert_bits())
+        .integer(state.observation_bits())
         .integer(state.turning);
     for heard in state.heard.iter().take(state.sources.into()) {
         stream.integer(heard.map_or(u64::MAX, |heard| heard.0));

@@ -5,15 +5,16 @@
 
 use serde::Serialize;
 
-use super::alert_list::{AlertChange, ListedAlertJson, NoteJson};
+use super::alert_list::{AlertChange, AlertState, Figures, ListedAlert, ListedAlertJson, NoteJson};
 use super::live_state::{LiveMetres, LiveState};
 use super::messages::Notice;
-use super::pilot_text::{Missed, alert_text, setting_text};
+use super::pilot_text::Missed;
 use super::run::Loop;
 pub use super::unsure_stretch::UnsureStretch;
 use headrace_coverage::{
     Cause, Causes, Evidence, Run, RunChange, RunId, Section, Sections, Stretch, Unsure, Verdict,
 };
+use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 
@@ -69,18 +70,7 @@ pub enum LiveMessage {
     /// Not all heads have passed the place where the vehicle began or turned back, and the vehicle is now
     /// well away from it.
     NotInspected(UnsureStretch),
-    /// An alert about the dive as a whole.
-    Alert {
-        /// Kind.
-        kind: &'static str,
-        /// Id of the distrusted head.
-        head: Option<String>,
-        /// Chainage, m.
-        x_m: f64,
-        /// Text.
-        text: String,
-    },
-    /// An alert of the list has changed.
+    /// An alert has changed.
     AlertChange {
         /// Kind of change.
         change: AlertChange,
@@ -115,6 +105,8 @@ pub struct LiveMessages {
     told: Vec<Stretch>,
     /// Sections at an end of the coverage extent, kept until the vehicle is well away from them.
     at_ends: Option<Stretch>,
+    /// Last reported doubtful setting, and the number of its alert.
+    setting: Option<(u32, SettingDoubt)>,
     way_told: Option<MonoNs>,
 }
 
@@ -143,8 +135,10 @@ impl LiveMessages {
         match notice {
             Notice::Advice(_) => {}
             Notice::Listed { change, at, alert } => {
-                let alert = Box::new(alert.json(&dive.view().surroundings(), *at));
-                tell(LiveMessage::AlertChange { change: *change, alert });
+                if let Figures::Setting(doubt, _) = alert.figures {
+                    self.setting = Some((alert.number, doubt));
+                }
+                tell(alert_change(*change, alert, *at, dive));
             }
             Notice::Note(note) => tell(LiveMessage::Note(note.into())),
             Notice::Section { section, .. } => {
@@ -153,26 +147,13 @@ impl LiveMessages {
                 self.note_unsure(*section, sections, tell);
             }
             Notice::Run { id, change, .. } => self.run(*id, *change, dive, tell),
-            Notice::Alert(kind, source) => {
-                let Some(alert) = dive.view().alerts().get(*kind, *source) else { return };
-                let name = |source: u16| {
-                    dive.sources().get(usize::from(source)).map_or_else(String::new, |info| info.id.clone())
-                };
-                let head = source.map(|source| name(source.0));
-                let text = if let Some(doubt) = &alert.setting {
-                    setting_text(doubt, alert.x_m, &name)
-                } else {
-                    let head = head.clone().unwrap_or_default();
-                    alert_text(alert.kind, &head, alert.x_m, alert.worst_m)
-                };
-                tell(LiveMessage::Alert { kind: alert.kind.as_str(), head, x_m: alert.x_m, text });
-            }
         }
     }
 
     /// Reports whatever the live state requires, after every tick.
     pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(at) = state.at else { return };
+        self.tell_other_setting(at, dive, tell);
         let sections = &dive.view().coverage().sections;
         // The interval begins at the first update, when there is nothing to report.
         let since = *self.way_told.get_or_insert(at);
@@ -196,6 +177,20 @@ impl LiveMessages {
     pub fn end(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         self.close_run(sections, tell);
         self.close_unsure(sections, tell);
+    }
+
+    /// Reports that another setting is doubtful than before. The alert goes on, so that there is no notice.
+    fn tell_other_setting(&mut self, at: MonoNs, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
+        let doubted = dive.view().alert_list().iter().rev().find_map(|alert| match alert.figures {
+            Figures::Setting(doubt, _) if alert.state == AlertState::Active => Some((alert, doubt)),
+            _ => None,
+        });
+        let Some((alert, doubt)) = doubted else { return };
+        let is_other =
+            |(number, told): (u32, SettingDoubt)| number == alert.number && !told.is_of_same(&doubt);
+        if self.setting.replace((alert.number, doubt)).is_some_and(is_other) {
+            tell(alert_change(AlertChange::Changed, alert, at, dive));
+        }
     }
 
     fn tell_ends(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
@@ -356,6 +351,10 @@ impl LiveMessages {
         *told = told.union(evidence.causes);
         tell(flag(id, run, index, &evidence, dive));
     }
+}
+
+fn alert_change(change: AlertChange, alert: &ListedAlert, at: MonoNs, dive: &Loop) -> LiveMessage {
+    LiveMessage::AlertChange { change, alert: Box::new(alert.json(&dive.view().surroundings(), at)) }
 }
 
 /// The stretch with the present state of its sections, but with the ends that were reported.

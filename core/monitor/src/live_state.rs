@@ -9,7 +9,7 @@
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
-use super::alerts::{AlertKind, MOST_ALERTS};
+use super::observations::{MOST_OBSERVATIONS, ObservedKind, Occurrences};
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::pose_sd::PoseSd;
@@ -27,7 +27,7 @@ pub(crate) use condition::test_state;
 pub use condition::{Condition, Lamp};
 
 /// Version of the live state and of its JSON.
-pub const LIVE_STATE_VERSION: u32 = 1;
+pub const LIVE_STATE_VERSION: u32 = 2;
 /// Age above which data is shown as stale. It equals the maximum time between readings of a head that isn't
 /// silent.
 pub const OLD_AFTER: DurNs = DurNs(2_000_000_000);
@@ -95,23 +95,17 @@ impl LiveMetres {
     }
 }
 
-/// An alert that holds now.
+/// An observation that holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ActiveAlert {
-    /// Kind.
-    pub kind: AlertKind,
-    /// The distrusted head.
-    pub source: Option<SourceId>,
-    /// Time at which the alert's present occurrence began.
-    pub since: MonoNs,
-    /// Chainage of the alert's first occurrence, m.
-    pub x_m: f64,
-    /// Largest deviation, m.
-    pub worst_m: f64,
+pub(crate) struct ActiveObservation {
+    pub(crate) kind: ObservedKind,
+    /// The distrusted head, or the velocity log that the cable counter differs from.
+    pub(crate) source: Option<SourceId>,
+    pub(crate) occurrences: Occurrences,
 }
 
-/// All alerts that hold now.
-pub type ActiveAlerts = [Option<ActiveAlert>; MOST_ALERTS];
+/// All observations that hold now.
+pub(crate) type ActiveObservations = [Option<ActiveObservation>; MOST_OBSERVATIONS];
 
 /// Slowest practical speed, m/s. A lower advised speed counts as no speed.
 pub const LEAST_MPS: f64 = 0.005;
@@ -176,8 +170,8 @@ pub struct LiveState {
     pub passed: bool,
     /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
     pub back_to_m: Option<f64>,
-    /// Alerts that hold.
-    pub alerts: ActiveAlerts,
+    /// Observations that hold.
+    pub(crate) observations: ActiveObservations,
     /// Bitmask of the sources that are profiling heads.
     pub heads: u64,
     /// Bitmask of the sources of turning heads.
@@ -193,7 +187,7 @@ pub struct LiveState {
 }
 
 stateful!(LiveState {
-    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, alerts, turning, deaf, hung;
+    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, observations, turning, deaf, hung;
     slots: heard;
     fixed: target_m, confidence_sd, length_m, heads_reach_m, heads, sources;
 });
@@ -219,7 +213,7 @@ impl LiveState {
             unsure: None,
             passed: false,
             back_to_m: None,
-            alerts: [None; MOST_ALERTS],
+            observations: [None; MOST_OBSERVATIONS],
             heads,
             turning: 0,
             deaf: 0,
@@ -262,11 +256,11 @@ impl LiveState {
         let bit = |set: u64| {
             u32::try_from(source).is_ok_and(|source| set.checked_shr(source).unwrap_or(0) & 1 == 1)
         };
-        let distrusted = |alert: &ActiveAlert| alert.source.is_some_and(|of| of.index() == source);
+        let distrusted = |known: &ActiveObservation| known.source.is_some_and(|of| of.index() == source);
         match self.age_of(source) {
             None => SensorState::Never,
             Some(age) if age.0 > OLD_AFTER.0 => SensorState::Silent,
-            Some(_) if self.alerts.iter().flatten().any(distrusted) => SensorState::Distrusted,
+            Some(_) if self.observations.iter().flatten().any(distrusted) => SensorState::Distrusted,
             Some(_) if bit(self.deaf) => SensorState::Deaf,
             Some(_) if bit(self.hung) => SensorState::Hung,
             Some(_) if self.at.is_some() && bit(self.heads) && !bit(self.turning) => SensorState::Stalled,
@@ -307,9 +301,9 @@ impl LiveState {
         (margins.losses_mps < LEFT * margins.position_mps).then_some(advice.lost_share)
     }
 
-    /// Bitmask of the kinds of alerts that hold.
-    pub(super) fn alert_bits(&self) -> u64 {
-        self.alerts.iter().flatten().fold(0, |bits, alert| bits | 1 << alert.kind as u64)
+    /// Bitmask of the kinds of observations that hold.
+    pub(super) fn observation_bits(&self) -> u64 {
+        self.observations.iter().flatten().fold(0, |bits, known| bits | 1 << known.kind as u64)
     }
 }
 

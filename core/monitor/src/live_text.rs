@@ -292,12 +292,6 @@ pub fn message_line(told: &LiveMessage, profile: &Profile, heads: &HeadDescripti
             let place = to(stretch.from_m, stretch.to_m);
             line(place, what, helps_text(stretch), Some(Lamp::Amber))
         }
-        // Its text begins with the place.
-        LiveMessage::Alert { x_m, text, .. } => {
-            let place = station(*x_m);
-            let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();
-            line(place, format!("ALERT: {said}"), String::new(), Some(Lamp::Red))
-        }
         LiveMessage::AlertChange { change, alert } => alert_line(*change, alert),
         LiveMessage::Note(note) => {
             let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };
@@ -329,26 +323,24 @@ fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
 impl LiveMessage {
     /// Whether the message's line adds something to the status and the other lines.
     ///
-    /// Of the changes of alerts, these add something: acknowledgements, remaining resources, and ends that no
-    /// other line shows.
+    /// Of the changes of alerts, these add something: acknowledgements, remaining resources, doubts about
+    /// sensors, settings and the dive as a whole, and ends that no other line shows.
     pub fn adds_line(&self) -> bool {
         let Self::AlertChange { change, alert } = self else { return true };
         let is_left = matches!(alert.kind, "cable_left" | "time_left" | "battery_left");
         let is_sensor =
             matches!(alert.kind, "sensor_silent" | "sensor_stalled" | "sensor_deaf" | "sensor_hung");
-        let is_told_once = is_sensor
-            || matches!(
-                alert.kind,
-                "head_scattered" | "head_constant" | "head_outvoted" | "cable_doubted" | "setting_doubted"
-            );
+        let is_observed = alert.occurrences.is_some();
+        let has_end_line =
+            is_sensor || is_observed && !matches!(alert.kind, "outside_tunnel" | "profile_contradicted");
         match change {
             AlertChange::Acknowledged => true,
-            AlertChange::Raised => is_left || is_sensor,
-            AlertChange::Changed => is_left,
+            AlertChange::Raised => is_left || is_sensor || is_observed,
+            AlertChange::Changed => is_left || is_observed,
             // If nobody has acknowledged the alert, the line appears when the condition ends, not at the
             // acknowledgement.
-            AlertChange::Rectified => is_told_once,
-            AlertChange::Cleared => is_told_once && alert.rectified_s == alert.cleared_s,
+            AlertChange::Rectified => has_end_line,
+            AlertChange::Cleared => has_end_line && alert.rectified_s == alert.cleared_s,
             AlertChange::Silenced => false,
         }
     }

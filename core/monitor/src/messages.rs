@@ -7,8 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::advice_log::AdviceEntry;
 use super::alert_list::{AlertChange, ListedAlert};
-use super::alerts::AlertKind;
-use super::live_state::{ActiveAlerts, LiveMetres};
+use super::live_state::{ActiveObservations, LiveMetres};
 use super::notes::Note;
 use headrace_coverage::{Judgement, Loss, Reach, RunChange, RunId, Stretch};
 use headrace_fusion::filter::cable::CableDoubt;
@@ -149,7 +148,7 @@ pub struct PlacedItem {
     pub placement: Placement,
 }
 
-/// Judged metres and active alerts at an update.
+/// Judged metres and the observations that hold at an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
     /// Metres of the coverage extent by verdict.
@@ -160,8 +159,8 @@ pub struct Standing {
     pub passed: bool,
     /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
     pub back_to_m: Option<f64>,
-    /// Alerts that hold.
-    pub alerts: ActiveAlerts,
+    /// Observations that hold.
+    pub(crate) observations: ActiveObservations,
 }
 
 /// A result for the outlets.
@@ -186,8 +185,6 @@ pub enum Notice {
         /// Kind of change.
         change: RunChange,
     },
-    /// First occurrence of an alert. The source is the head, if the alert names one.
-    Alert(AlertKind, Option<SourceId>),
     /// Speed advice.
     Advice(AdviceEntry),
     /// An alert of the list has changed.

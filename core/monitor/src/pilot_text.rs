@@ -4,9 +4,9 @@
 //! `as_str`, and the page's labels are in `plugins/dashboard/page/src/text`.
 
 use super::advice_log::AdviceEntry;
-use super::alerts::AlertKind;
 use super::head_descriptions::HeadDescriptions;
 use super::live_state::LEAST_MPS;
+use super::observations::ObservedKind;
 use serde::{Deserialize, Serialize};
 
 use headrace_coverage::{Action, Again, Cause, Causes, Evidence, Run, Sections};
@@ -310,32 +310,40 @@ pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// Text of an alert at a chainage, m. `off_m` is the deviation, m; `head` is the head or velocity log, if the
-/// alert names one.
-pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
+/// Text of an observation that a log has in `judgements`; `None` if no kind has this number.
+///
+/// `x_m` is the chainage, m; `off_m` the deviation, m; `head` the head or velocity log, if it names one.
+pub fn recorded_observation_text(kind: u64, head: &str, x_m: f64, off_m: f64) -> Option<String> {
+    let kind = ObservedKind::ALL.into_iter().find(|known| *known as u64 == kind)?;
+    Some(observation_text(kind, head, x_m, off_m))
+}
+
+/// Text of an observation at a chainage, m. `off_m` is the deviation, m; `head` is the head or velocity log,
+/// if the observation names one.
+pub(super) fn observation_text(kind: ObservedKind, head: &str, x_m: f64, off_m: f64) -> String {
     let x = station(x_m);
     match kind {
-        AlertKind::OutsideTunnel => {
+        ObservedKind::OutsideTunnel => {
             format!("ch {x}  samples {off_m:.2} m outside the tunnel: check the tether's zero")
         }
-        AlertKind::ProfileContradicted => format!(
+        ObservedKind::ProfileContradicted => format!(
             "ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; no section passes"
         ),
-        AlertKind::HeadScattered => {
+        ObservedKind::HeadScattered => {
             format!("ch {x}  returns of {head} differ by {:.2} m: noise; they are ignored", off_m.abs())
         }
-        AlertKind::HeadConstant => format!(
+        ObservedKind::HeadConstant => format!(
             "ch {x}  {head} measures {off_m:.2} m at every angle: its own frame or a bubble; its returns are ignored"
         ),
-        AlertKind::HeadOutvoted => format!(
+        ObservedKind::HeadOutvoted => format!(
             "ch {x}  {head} measures the wall {off_m:+.2} m away from that of the other heads; its returns are ignored"
         ),
-        AlertKind::SettingDoubted => format!("ch {x}  ranges contradict a setting of the vehicle file"),
-        AlertKind::CableDoubted if !head.is_empty() => format!(
+        ObservedKind::SettingDoubted => format!("ch {x}  ranges contradict a setting of the vehicle file"),
+        ObservedKind::CableDoubted if !head.is_empty() => format!(
             "ch {x}  cable counter and {head} differ by {:.2} m: one of them is wrong; sections there get no verdict",
             off_m.abs()
         ),
-        AlertKind::CableDoubted => format!(
+        ObservedKind::CableDoubted => format!(
             "ch {x}  cable counter and inertial unit differ by {:.2} m: position from the inertial unit alone; sections there get no verdict",
             off_m.abs()
         ),

@@ -27,7 +27,7 @@ pub enum RecordKind {
     Pose = 6,
     /// An update without a fix.
     NoPose = 7,
-    /// An alert about the dive as a whole.
+    /// First occurrence of an observation about the dive as a whole.
     Alert = 8,
     /// A ping whose return was not accepted as wall.
     Doubtful = 9,
@@ -226,7 +226,7 @@ impl RecordKind {
                 ("kind", Integer),
                 ("x_m", Number),
                 ("off_m", Number),
-                // Present only if the alert names a source.
+                // Present only if the observation names a source.
                 ("source", Integer),
             ],
             Self::AlertChange => &ALERT_CHANGE,

@@ -35,7 +35,7 @@ pub enum SurveyStage {
     Walk,
     /// Judges the sections that are due.
     Judge,
-    /// Reports metres by verdict and active alerts, if the stop is an update.
+    /// Reports metres by verdict and the observations that hold, if the stop is an update.
     Report,
     /// Reserved for plugins that read the verdicts.
     Surveyed,

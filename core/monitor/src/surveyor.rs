@@ -10,7 +10,7 @@ mod due;
 mod heads;
 mod judge;
 mod missing_samples;
-mod navigation_alerts;
+mod navigation_doubts;
 mod passages;
 mod samples;
 mod standing;
@@ -22,10 +22,10 @@ use std::sync::Arc;
 
 use bevy_ecs::prelude::Resource;
 
-use super::alerts::Alerts;
 use super::entities::{HeadClassifier, HeadEntities, HeadFrontier, HeadSweep};
 use super::error::PluginError;
 use super::merge::MAX_TICK_PACKETS;
+use super::observations::Observations;
 use super::part::Part;
 use super::placer::{Placed, PlacedTick};
 use super::resources::{Coverage, Digests, Finder, Tally};
@@ -74,7 +74,7 @@ impl Surveyor {
         part.insert_state("driving", Driving::default());
         part.insert_state("coverage", coverage);
         part.insert_state("search for holes", finder);
-        part.insert_state("observations", Alerts::default());
+        part.insert_state("observations", Observations::default());
         part.insert_state("tally", Tally::default());
         part.add_systems(SurveyStage::Classify, classify::classify_returns);
         part.add_systems(SurveyStage::Walk, walk::walk);
@@ -118,11 +118,6 @@ impl Surveyor {
 
     /// Counts of pings over the whole dive.
     pub fn tally(&self) -> &Tally {
-        self.part.world.resource()
-    }
-
-    /// Alerts about the dive as a whole.
-    pub fn alerts(&self) -> &Alerts {
         self.part.world.resource()
     }
 

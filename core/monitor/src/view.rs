@@ -3,7 +3,6 @@
 use super::adviser::Advised;
 use super::alert_list::{AlertList, TextContext};
 use super::alerter::Alerter;
-use super::alerts::Alerts;
 use super::console::ConsoleCounts;
 use super::digest::Digest;
 use super::entities::{SensorHealth, VehicleState};
@@ -113,11 +112,6 @@ impl<'a> DiveView<'a> {
     /// Counts of pings over the whole dive.
     pub fn tally(&self) -> &'a Tally {
         self.surveyor.tally()
-    }
-
-    /// Alerts about the dive as a whole.
-    pub fn alerts(&self) -> &'a Alerts {
-        self.surveyor.alerts()
     }
 
     /// Alerts with their life cycle.

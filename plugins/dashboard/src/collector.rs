@@ -152,7 +152,7 @@ impl Collector {
             }
             Notice::Run { .. } => self.back_due = true,
             Notice::Note(_) => self.notes_due = true,
-            Notice::Alert(..) | Notice::Advice(_) | Notice::Listed { .. } => {}
+            Notice::Advice(_) | Notice::Listed { .. } => {}
         }
         let mut told = Vec::new();
         self.teller.hear(notice, dive, &mut |one| told.push(one));

@@ -28,8 +28,8 @@ const MOST_STATES: usize = 7200;
 /// Attribute that marks the embedded dive in an exported page.
 pub const MARK: &str = "id=\"dive\"";
 /// Fields of a state that a file omits, because the file stores them only once or they have no meaning there.
-const LEFT_OUT: [&str; 9] =
-    ["type", "seq", "alert_list", "alerts", "playback", "ended", "page_dropped", "rates", "recording"];
+const LEFT_OUT: [&str; 8] =
+    ["type", "seq", "alert_list", "playback", "ended", "page_dropped", "rates", "recording"];
 
 /// Reason why a dive can't be exported.
 #[derive(Debug, thiserror::Error)]

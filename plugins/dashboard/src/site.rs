@@ -144,7 +144,7 @@ impl Site {
         Hello {
             kind: "hello",
             seq: to.seq,
-            version: 1,
+            version: 2,
             program: concat!("headrace ", env!("CARGO_PKG_VERSION")),
             instance: to.instance,
             mode: self.mode,

@@ -1,13 +1,13 @@
 //! Wrong settings are reported with their value within a hundred metres. Correct settings aren't reported.
 
-use headrace_monitor::report::SettingReport;
+use headrace_monitor::alert_list::SettingJson;
 use headrace_simulator::Scene;
 use headrace_tests::field_table::{Cell, Condition, Driven, VEHICLES};
 use headrace_tests::{scenes, truth};
 
-fn doubted(scene: &Scene, believed: &Scene) -> Option<SettingReport> {
+fn doubted(scene: &Scene, believed: &Scene) -> Option<SettingJson> {
     let report = truth::dive_believing(scene, &believed.vehicle).report;
-    report.alerts.iter().find_map(|alert| alert.setting.clone())
+    report.alert_list.iter().find_map(|alert| alert.setting.clone())
 }
 
 /// A vehicle file with one line replaced in one sensor's table.
@@ -36,12 +36,12 @@ const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}
 
 /// Setting that is reported in a dive of 100 m by a pilot who wanders slightly. `truly` describes the simulated
 /// vehicle, and `told` is the vehicle file that headrace reads.
-fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingReport> {
+fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingJson> {
     told_swinging(truly, told, [aside_m, 3.0], seed)
 }
 
 /// As [`told`], but the pilot yaws by this angle, degrees.
-fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u64) -> Option<SettingReport> {
+fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u64) -> Option<SettingJson> {
     let heads: Vec<&str> = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]
         .into_iter()
         .filter(|head| truly.contains(&format!("id = {head:?}")))
@@ -117,7 +117,7 @@ fn swapped_heads_are_reported() {
         swapped = changed(&changed(&swapped, "sonar_1", key, &other), "sonar_3", key, &one);
     }
     let doubt = told(&swapped, &right, ASIDE_M, 1).unwrap();
-    let SettingReport { what, source, other, .. } = &doubt;
+    let SettingJson { what, source, other, .. } = &doubt;
     let named = (*what, source.as_deref(), other.as_deref());
     assert_eq!(named, ("swapped", Some("sonar_1"), Some("sonar_3")), "{doubt:?}");
 }

@@ -52,7 +52,7 @@ fn one_complete_visit_passes_sections_sampled_during_a_position_doubt() {
     let back = dive(4, &[(12.0, 0.09), (9.0, -0.09)], STUCK);
     let where_m = [8.0, 13.0];
     let unsure = with_verdict(&out, "cannot_say", where_m);
-    assert!(unsure.len() >= 2, "nothing was in doubt: {:?}", out.report.alerts);
+    assert!(unsure.len() >= 2, "nothing was in doubt: {:?}", out.report.alert_list);
     let passed = with_verdict(&back, "pass", where_m);
     let still: Vec<_> = unsure.iter().filter(|start| !passed.contains(start)).collect();
     assert!(still.is_empty(), "undecided: {unsure:?}; still not passed: {still:?}");

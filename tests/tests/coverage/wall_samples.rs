@@ -5,12 +5,14 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use headrace_monitor::report::AlertReport;
+use headrace_monitor::alert_list::ListedAlertJson;
 use headrace_oracle::wall::Wall;
 use headrace_sensor::device::Sense;
 use headrace_simulator::Simulation;
 use headrace_tests::instrumented::{self, Dive, Sample};
 use headrace_tests::scenes;
+
+use crate::observed;
 
 const VITA: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
 /// A very slow dive in a pipe of 1 m radius.
@@ -41,8 +43,10 @@ fn dive(heads: usize, effects: &str) -> Dive {
 }
 
 /// Alerts about a head that isn't trusted.
-fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a AlertReport> {
-    dive.report.alerts.iter().filter(|alert| alert.head.as_deref() == Some(head)).collect()
+fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a ListedAlertJson> {
+    let mut alerts = observed(&dive.report);
+    alerts.retain(|alert| alert.sensor.as_deref() == Some(head));
+    alerts
 }
 
 /// Difference between the range of each ping and the true range of the object that its beam met, m. The order is that
@@ -109,7 +113,7 @@ fn head_stuck_at_one_range_passes_nothing() {
     let alone = dive(1, "stuck_range = { sensors = [\"sonar_0\"] }\n");
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
     // A constant range at the centre of a round pipe could be the wall of a pipe with another radius.
-    let kinds: Vec<_> = alone.report.alerts.iter().map(|alert| alert.kind).collect();
+    let kinds: Vec<_> = observed(&alone.report).into_iter().map(|alert| alert.kind).collect();
     assert_eq!(kinds, ["profile_contradicted"]);
 }
 
@@ -120,11 +124,12 @@ fn one_stuck_head_of_several_is_reported_and_the_others_count() {
         let effects = format!("stuck_range = {{ sensors = [\"{id}\"] }}\n");
         let (vehicle, scene) = (pipe(heads), format!("{CREEP}{effects}"));
         let dive = instrumented::dive(&vehicle, &scene);
-        let at = format!("{id} of {heads}: {:?} {:?}", dive.report.summary, dive.report.alerts);
+        let at = format!("{id} of {heads}: {:?} {:?}", dive.report.summary, dive.report.alert_list);
         let alerts = named(&dive, &id);
         assert!(matches!(alerts[..], [alert] if alert.kind == "head_outvoted"), "{at}");
-        assert!((-0.5..-0.4).contains(&alerts[0].worst_m), "{at}");
-        assert!(dive.report.alerts.iter().all(|alert| alert.head.as_deref().is_none_or(|head| head == id)));
+        assert!((-0.5..-0.4).contains(&alerts[0].worst_m.unwrap()), "{at}");
+        let all = observed(&dive.report);
+        assert!(all.iter().all(|alert| alert.sensor.as_deref().is_none_or(|head| head == id)), "{at}");
         assert!(dive.report.summary.pass_m >= least_m, "{at}");
         // The stuck head's returns pass no section.
         let others = dive.samples_of(|head| head != stuck);
@@ -156,8 +161,8 @@ fn constant_range_of_a_swaying_vehicle_is_reported_even_within_tolerance() {
     let dive = dive(2, &format!("stuck_range = {{ range_m = 0.95, sensors = [\"sonar_1\"] }}\n{DRIFT}"));
     let alerts = named(&dive, "sonar_1");
     let constant = alerts.iter().find(|alert| alert.kind == "head_constant").unwrap();
-    assert!((0.9..1.0).contains(&constant.worst_m), "{alerts:?}");
-    assert!(named(&dive, "sonar_0").is_empty(), "{:?}", dive.report.alerts);
+    assert!((0.9..1.0).contains(&constant.worst_m.unwrap()), "{alerts:?}");
+    assert!(named(&dive, "sonar_0").is_empty(), "{:?}", dive.report.alert_list);
 }
 
 #[test]
@@ -181,7 +186,7 @@ fn sound_heads_are_accepted_in_a_wider_pipe_and_while_swaying() {
     let wider = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 1.06\n";
     for scene in [format!("{CREEP}{DRIFT}"), format!("{CREEP}{wider}")] {
         let dive = instrumented::dive(&pipe(2), &scene);
-        assert!(dive.report.alerts.is_empty(), "{:?}", dive.report.alerts);
+        assert!(observed(&dive.report).is_empty(), "{:?}", dive.report.alert_list);
         assert_eq!(dive.report.dive.samples_rejected.doubtful_returns, 0);
         assert!(
             dive.report.sections.iter().all(|section| section.deviation.is_none_or(|of| !of.contradicts))
@@ -228,7 +233,8 @@ fn caves_heaps_boulders_traps_and_side_tunnels_count_as_wall() {
         let doubtful = dive.pings.iter().filter(|ping| ping.doubtful.is_some()).count();
         let wall = dive.samples().count();
         assert!(wall > 50_000 && 200 * doubtful <= wall, "{name}: {doubtful} of {wall}");
-        assert!(dive.report.alerts.iter().all(|alert| alert.head.is_none()), "{:?}", dive.report.alerts);
+        let all = observed(&dive.report);
+        assert!(all.iter().all(|alert| alert.sensor.is_none()), "{all:?}");
         let told = dive.report.dive.samples_rejected.doubtful_returns;
         assert_eq!(usize::try_from(told).unwrap(), doubtful);
         // No section fails because doubtful returns are missing.

@@ -98,7 +98,8 @@ fn of_tick(dive: &Loop) -> u64 {
         (name, stream.value(), stream.words(), stream.records(), stream.lost()).hash(&mut hasher);
     }
     let heard = (dive.view().readings(), dive.view().health(), dive.view().vehicle(), dive.view().tally());
-    let told = (dive.view().notices().collect::<Vec<_>>(), dive.view().live_state(), dive.view().alerts());
+    let alerts: Vec<_> = dive.view().alert_list().iter().collect();
+    let told = (dive.view().notices().collect::<Vec<_>>(), dive.view().live_state(), alerts);
     let console = dive.view().console_counts();
     (dive.ticks(), dive.now().0, format!("{heard:?} {told:?} {console:?}")).hash(&mut hasher);
     hasher.finish()

@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::timer::{self, Due};
 use super::{AlertList, AlertState, Figures, ListKind, Priority, Telling};
-use crate::live_state::{Condition, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState};
+use crate::live_state::{
+    ActiveObservation, Condition, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState,
+};
+use crate::observations::ObservedKind;
 use crate::pilot_text::AdviceFigures;
 use headrace_coverage::{Stretch, Unsure};
 use headrace_fusion::filter::setting_check::SettingDoubt;
@@ -73,7 +76,7 @@ impl AlertList {
         self.take_speed(beat, to);
         self.take_position(beat, begun, to);
         self.take_unsure(beat, to);
-        self.take_dive(beat, to);
+        self.take_observations(beat, to);
         self.take_sensors(at, state, to);
         self.take_left(at, state, begun, to);
         self.take_recording(at, to);
@@ -155,26 +158,25 @@ impl AlertList {
         self.observe(at, &Seen::of(ListKind::CannotSay, grows, Figures::CannotSay(stretch)), to);
     }
 
-    /// Checks alerts about the dive as a whole.
-    fn take_dive(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
+    /// Checks the observations about the dive as a whole.
+    fn take_observations(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
         let Beat { at, state, setting } = *beat;
         let active = |kind: ListKind, source: Option<SourceId>| {
-            let is_it = |alert: &&crate::live_state::ActiveAlert| {
-                ListKind::from(alert.kind) == kind && alert.source == source
-            };
-            state.alerts.iter().flatten().find(is_it).copied()
+            let is_it =
+                |known: &&ActiveObservation| ListKind::from(known.kind) == kind && known.source == source;
+            state.observations.iter().flatten().find(is_it).copied()
         };
-        for kind in crate::alerts::AlertKind::ALL.map(ListKind::from) {
+        for kind in ObservedKind::ALL.map(ListKind::from) {
             let of_none = (!kind.is_of_sensor()).then_some(None);
             let sources = if kind.may_name_a_sensor() { usize::from(state.sources) } else { 0 };
             let of_sensors = (0..).take(sources).map(|number| Some(SourceId(number)));
             for source in of_none.into_iter().chain(of_sensors) {
                 let found = active(kind, source);
                 let figures = match (found, setting) {
-                    (Some(alert), Some(doubt)) if kind == ListKind::SettingDoubted => {
-                        Figures::Setting(doubt, alert.x_m)
+                    (Some(known), Some(doubt)) if kind == ListKind::SettingDoubted => {
+                        Figures::Setting(doubt, known.occurrences)
                     }
-                    (Some(alert), _) => Figures::Deviation(alert.x_m, alert.worst_m),
+                    (Some(known), _) => Figures::Deviation(known.occurrences),
                     (None, _) => Figures::None,
                 };
                 self.observe(at, &Seen { kind, source, holds: found.is_some(), figures }, to);

@@ -6,10 +6,12 @@
 use serde::Serialize;
 
 use super::texts::TextContext;
-use super::{AlertList, AlertState, Figures, ListedAlert, Priority};
+use super::{AlertList, AlertState, Figures, ListedAlert, Occurrences, Priority};
 use crate::live_state::LiveState;
 use crate::notes::{Note, Spoken};
 use crate::pilot_text::station;
+use crate::source::SourceInfo;
+use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};
 use headrace_geometry::time::MonoNs;
 
 /// Maximum number of alerts in a list.
@@ -61,8 +63,36 @@ pub struct ListedAlertJson {
     /// Number of times that the alert was raised. For missed stretches: number of stretches that the alert
     /// represents.
     pub count: u32,
+    /// Number of occurrences in the dive so far, see [`Occurrences`]; `None` unless the alert reports an
+    /// observation about the dive as a whole.
+    pub occurrences: Option<u64>,
+    /// Chainage of the first occurrence, m.
+    pub first_m: Option<f64>,
+    /// Largest deviation, m; 0 for a doubtful setting.
+    pub worst_m: Option<f64>,
+    /// Doubtful setting, as last judged; `None` for other alerts.
+    pub setting: Option<SettingJson>,
     /// Number of the alert into which this alert was merged.
     pub merged_into: Option<u32>,
+}
+
+/// A setting that ranges contradict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SettingJson {
+    /// `range_scale`, `head_turned`, `head_pitched`, `head_yawed`, `wrong_way_round` or `swapped`.
+    pub what: &'static str,
+    /// Name of the source; `None` if no single source has the setting.
+    pub source: Option<String>,
+    /// Name of the other source, for two swapped sources.
+    pub other: Option<String>,
+    /// Ratio of measured ranges to those of the design; `None` for other settings.
+    pub range_ratio: Option<f64>,
+    /// Angle to be added to the angle in the vehicle file, degrees; `None` for other settings.
+    ///
+    /// It is an angle about the head's axis, a pitch or a yaw.
+    pub angle_deg: Option<f64>,
+    /// Difference from the correct value, in standard deviations.
+    pub sure_ratio: f64,
 }
 
 /// Acknowledgement of an alert, with person and time.
@@ -159,6 +189,33 @@ impl From<&Note> for NoteJson {
     }
 }
 
+impl SettingJson {
+    fn of(doubt: &SettingDoubt, sources: &[SourceInfo]) -> Self {
+        let name =
+            |source: u16| sources.get(usize::from(source)).map_or_else(String::new, |info| info.id.clone());
+        let SettingDoubt { setting, source, sure_sd } = *doubt;
+        Self {
+            what: setting.as_str(),
+            source: source.map(name),
+            other: setting.other().map(name),
+            range_ratio: matches!(setting, Setting::RangeScale(_)).then_some(1.0 + setting.figure()),
+            angle_deg: setting.angle_rad().map(f64::to_degrees),
+            sure_ratio: sure_sd,
+        }
+    }
+}
+
+impl Figures {
+    /// Occurrences of the observation that the alert reports, and the doubtful setting.
+    fn observed(&self) -> (Option<Occurrences>, Option<SettingDoubt>) {
+        match *self {
+            Self::Deviation(occurrences) => (Some(occurrences), None),
+            Self::Setting(doubt, occurrences) => (Some(occurrences), Some(doubt)),
+            _ => (None, None),
+        }
+    }
+}
+
 impl ListedAlert {
     /// The alert in JSON, at `now`.
     pub fn json(&self, around: &TextContext<'_>, now: MonoNs) -> ListedAlertJson {
@@ -170,6 +227,7 @@ impl ListedAlert {
             _ => None,
         };
         let is_missed = matches!(self.figures, Figures::Missed(..));
+        let (occurrences, setting) = self.figures.observed();
         ListedAlertJson {
             number: self.number,
             priority: self.priority.as_str(),
@@ -193,6 +251,10 @@ impl ListedAlert {
             at_most_mps: at_most_mps.filter(|mps| *mps > 0.0),
             sensor: self.source.and_then(|source| Some(around.sources.get(source.index())?.id.clone())),
             count: self.count,
+            occurrences: occurrences.map(|all| all.count),
+            first_m: occurrences.map(|all| all.first_m),
+            worst_m: occurrences.map(|all| all.worst_m),
+            setting: setting.map(|doubt| SettingJson::of(&doubt, around.sources)),
             merged_into: self.merged_into,
         }
     }

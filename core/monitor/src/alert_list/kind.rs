@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::alerts::AlertKind;
+use crate::observations::ObservedKind;
 pub use headrace_vehicle::AlertClass;
 
 /// Urgency of an alert.
@@ -56,19 +56,19 @@ pub enum ListKind {
     SensorSilent,
     /// A head doesn't turn.
     SensorStalled,
-    /// See [`AlertKind::HeadScattered`].
+    /// Successive returns of a head disagree: they are noise.
     HeadScattered,
-    /// See [`AlertKind::HeadConstant`].
+    /// A head's range stays constant although it must change at the vehicle's place.
     HeadConstant,
-    /// See [`AlertKind::HeadOutvoted`].
+    /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
-    /// See [`AlertKind::CableDoubted`].
+    /// The cable counter differs from the inertial unit or from a velocity log: one of them is wrong.
     CableDoubted,
-    /// See [`AlertKind::SettingDoubted`].
+    /// Ranges contradict a setting of the vehicle file.
     SettingDoubted,
-    /// See [`AlertKind::OutsideTunnel`].
+    /// Samples fall beyond either end of the tunnel.
     OutsideTunnel,
-    /// Most samples contradict the profile; see [`AlertKind::ProfileContradicted`].
+    /// Most samples of a section deviate from the design profile by more than the contradiction limit.
     ProfileContradicted,
     /// A log recording fails.
     NotRecorded,
@@ -127,13 +127,13 @@ impl ListKind {
             Self::NoData => "no_data",
             Self::SensorSilent => "sensor_silent",
             Self::SensorStalled => "sensor_stalled",
-            Self::HeadScattered => AlertKind::HeadScattered.as_str(),
-            Self::HeadConstant => AlertKind::HeadConstant.as_str(),
-            Self::HeadOutvoted => AlertKind::HeadOutvoted.as_str(),
-            Self::CableDoubted => AlertKind::CableDoubted.as_str(),
-            Self::SettingDoubted => AlertKind::SettingDoubted.as_str(),
-            Self::OutsideTunnel => AlertKind::OutsideTunnel.as_str(),
-            Self::ProfileContradicted => AlertKind::ProfileContradicted.as_str(),
+            Self::HeadScattered => "head_scattered",
+            Self::HeadConstant => "head_constant",
+            Self::HeadOutvoted => "head_outvoted",
+            Self::CableDoubted => "cable_doubted",
+            Self::SettingDoubted => "setting_doubted",
+            Self::OutsideTunnel => "outside_tunnel",
+            Self::ProfileContradicted => "profile_contradicted",
             Self::NotRecorded => "not_recorded",
             Self::CableLeft => "cable_left",
             Self::TimeLeft => "time_left",
@@ -197,9 +197,9 @@ impl ListKind {
         }
     }
 
-    /// Corresponding alert about the dive as a whole.
-    pub(super) fn of_dive(self) -> Option<AlertKind> {
-        AlertKind::ALL.into_iter().find(|kind| Self::from(*kind) == self)
+    /// Kind of the observation that the alert reports; `None` for other alerts.
+    pub(super) fn observed(self) -> Option<ObservedKind> {
+        ObservedKind::ALL.into_iter().find(|kind| Self::from(*kind) == self)
     }
 
     /// Whether an alert of this kind may name a sensor.
@@ -224,16 +224,16 @@ impl ListKind {
     }
 }
 
-impl From<AlertKind> for ListKind {
-    fn from(kind: AlertKind) -> Self {
+impl From<ObservedKind> for ListKind {
+    fn from(kind: ObservedKind) -> Self {
         match kind {
-            AlertKind::OutsideTunnel => Self::OutsideTunnel,
-            AlertKind::ProfileContradicted => Self::ProfileContradicted,
-            AlertKind::HeadScattered => Self::HeadScattered,
-            AlertKind::HeadConstant => Self::HeadConstant,
-            AlertKind::HeadOutvoted => Self::HeadOutvoted,
-            AlertKind::CableDoubted => Self::CableDoubted,
-            AlertKind::SettingDoubted => Self::SettingDoubted,
+            ObservedKind::OutsideTunnel => Self::OutsideTunnel,
+            ObservedKind::ProfileContradicted => Self::ProfileContradicted,
+            ObservedKind::HeadScattered => Self::HeadScattered,
+            ObservedKind::HeadConstant => Self::HeadConstant,
+            ObservedKind::HeadOutvoted => Self::HeadOutvoted,
+            ObservedKind::CableDoubted => Self::CableDoubted,
+            ObservedKind::SettingDoubted => Self::SettingDoubted,
         }
     }
 }

@@ -58,7 +58,8 @@ impl Figures {
             Self::CannotSay(stretch) => stretch.largest().hole_m[0],
             Self::Advice(figures) => figures.speed_mps,
             Self::MissingRequirement(lacking) => f64::from(lacking as u8),
-            Self::Error(figure, _) | Self::Left(figure) | Self::Deviation(_, figure) => figure,
+            Self::Error(figure, _) | Self::Left(figure) => figure,
+            Self::Deviation(occurrences) => occurrences.worst_m,
             Self::Setting(doubt, _) => doubt.setting.figure(),
         }
     }

@@ -1,6 +1,8 @@
 use super::conditions::Seen;
 use super::*;
+use crate::live_state::ActiveObservation;
 use crate::messages::Notice;
+use crate::observations::ObservedKind;
 use crate::result_stream::ResultStream;
 use headrace_coverage::{RunChange, RunId};
 use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _};
@@ -289,6 +291,27 @@ fn higher_priority_needs_a_new_acknowledgement() {
     assert_eq!(battery(&bench), Some((Priority::Alarm, false)));
     beat(&mut bench, 8, 4.0);
     assert_eq!(battery(&bench), Some((Priority::EmergencyAlarm, true)));
+}
+
+/// Later occurrences change the figures of the alert that goes on. They are no change of the list.
+#[test]
+fn occurrences_update_the_figures_without_a_notice() {
+    let mut bench = Bench::new(0.0, 5.0);
+    let mut state = crate::live_state::test_state();
+    let mut beat = |bench: &mut Bench, at: MonoNs, occurrences: Occurrences| {
+        let kind = ObservedKind::ProfileContradicted;
+        state.observations[0] = Some(ActiveObservation { kind, source: None, occurrences });
+        (state.at, state.now) = (Some(at), at);
+        bench.with(|list, to| list.beat(&Beat { at, state: &state, setting: None }, to));
+    };
+    let first = Occurrences { count: 1, first_m: 7.0, worst_m: 0.4 };
+    beat(&mut bench, MonoNs(1_000_000_000), first);
+    let (notices, digest) = (bench.notices.len(), bench.stream.value());
+    let second = Occurrences { count: 2, worst_m: 0.5, ..first };
+    beat(&mut bench, MonoNs(1_200_000_000), second);
+    let alert = bench.list.iter().find(|alert| alert.kind == ListKind::ProfileContradicted).unwrap();
+    assert_eq!(alert.figures, Figures::Deviation(second));
+    assert_eq!((bench.notices.len(), bench.stream.value()), (notices, digest));
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! Texts of alerts, from the same table as the pilot's other lines. Allocates: outlets only, never within a
 //! tick.
 
-use super::{AlertState, Figures, ListKind, ListedAlert};
+use super::{AlertState, Figures, ListKind, ListedAlert, Occurrences};
 use crate::head_descriptions::HeadDescriptions;
 use crate::pilot_text::{
-    actions_text, advice_text, alert_text, cause_text, clock_text, no_position_text, setting_text,
+    actions_text, advice_text, cause_text, clock_text, no_position_text, observation_text, setting_text,
     speed_text, station,
 };
 use crate::source::SourceInfo;
@@ -96,13 +96,13 @@ impl ListedAlert {
             (_, Figures::Advice(figures)) => advice_text(figures, around.profile, around.heads),
             (_, Figures::MissingRequirement(lacking)) => no_position_text(*lacking).to_owned(),
             (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
-            (kind, Figures::Deviation(x_m, off_m)) => match kind.of_dive() {
-                Some(of_dive) => place_first(&alert_text(of_dive, &name, *x_m, *off_m), *x_m),
+            (kind, Figures::Deviation(Occurrences { first_m, worst_m, .. })) => match kind.observed() {
+                Some(kind) => place_first(&observation_text(kind, &name, *first_m, *worst_m), *first_m),
                 None => String::new(),
             },
-            (_, Figures::Setting(doubt, x_m)) => {
+            (_, Figures::Setting(doubt, Occurrences { first_m, .. })) => {
                 let name = |source: u16| around.name(source.into());
-                place_first(&setting_text(doubt, *x_m, &name), *x_m)
+                place_first(&setting_text(doubt, *first_m, &name), *first_m)
             }
             (ListKind::CableLeft, Figures::Left(left_m)) => format!("{left_m:.0} m of cable left"),
             (ListKind::TimeLeft, Figures::Left(left_s)) => match left_s / 60.0 {

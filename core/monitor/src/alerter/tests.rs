@@ -34,7 +34,7 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
         unsure: None,
         passed: false,
         back_to_m: None,
-        alerts: [None; crate::alerts::MOST_ALERTS],
+        observations: [None; crate::observations::MOST_OBSERVATIONS],
     };
     let found = Found { standings: vec![standing], runs: Vec::new(), notices: Vec::new() };
     let entry = AdviceEntry { at: AT, chainage_m: None, speed_mps: 0.07, advice: advice(&situation) };

@@ -45,8 +45,6 @@ pub struct LiveStateJson {
     pub metres: MetresJson,
     /// Last judged stretch without a verdict.
     pub cannot_say: Option<StretchJson>,
-    /// Alerts about the dive as a whole that hold now.
-    pub alerts: Vec<AlertJson>,
     /// Counts of the alerts that have not ended.
     pub alert_counts: AlertCountsJson,
     /// Text of the setting that would allow a higher speed; `None` if there is none.
@@ -152,17 +150,6 @@ pub struct StretchJson {
     pub to_m: f64,
 }
 
-/// An alert about the dive as a whole.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AlertJson {
-    /// Kind.
-    pub kind: &'static str,
-    /// Id of the distrusted head.
-    pub head: Option<String>,
-    /// Time at which the alert began, seconds on the log's clock.
-    pub since_s: f64,
-}
-
 impl LiveState {
     /// The state in JSON, with the alerts of the same dive. See
     /// [`Loop::live_state_json`](crate::run::Loop::live_state_json).
@@ -216,16 +203,6 @@ impl LiveState {
                 from_m: stretch.from as f64 * section_m,
                 to_m: stretch.to as f64 * section_m,
             }),
-            alerts: self
-                .alerts
-                .iter()
-                .flatten()
-                .map(|alert| AlertJson {
-                    kind: alert.kind.as_str(),
-                    head: alert.source.and_then(|source| name(source.index())),
-                    since_s: alert.since.as_secs_f64(),
-                })
-                .collect(),
             alert_counts: alerts.counts(),
             remedy: advice.and_then(|advice| gain_text(advice, around.heads)),
             left: alerts.left(self),

@@ -1,11 +1,16 @@
 use super::*;
+use crate::alert_list::{AlertList, Beat, Figures, Occurrences, Telling};
+use crate::fixtures::armed;
 use crate::head_descriptions::tests::two;
-use crate::live_state::{PositionState, test_state};
+use crate::live_state::{ActiveObservation, PositionState, test_state};
+use crate::observations::ObservedKind;
+use crate::result_stream::ResultStream;
 use crate::unsure_stretch::UnsureStretch;
 use headrace_coverage::{Driven, Unsure};
 use headrace_fusion::NoFix;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::shapes;
+use headrace_vehicle::{AlertTiming, LimitsConfig};
 
 fn status(state: &LiveState) -> PilotLine {
     let profile = shapes::circle(3.0).unwrap();
@@ -130,6 +135,31 @@ fn unsure_stretch_is_shown_with_reason_and_remedy() {
         text.push('\n');
     }
     insta::assert_snapshot!(text);
+}
+
+/// Alert of an observation, as raised at the first update.
+fn raised(kind: ObservedKind) -> ListedAlertJson {
+    let mut state = test_state();
+    let occurrences = Occurrences { count: 3, first_m: 12.5, worst_m: 0.4 };
+    state.observations[0] = Some(ActiveObservation { kind, source: None, occurrences });
+    let mut list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 0);
+    let mut to = Telling { notices: &mut Vec::new(), stream: &mut ResultStream::default() };
+    list.beat(&Beat { at: MonoNs(1), state: &state, setting: None }, &mut to);
+    let alert = list.iter().find(|alert| matches!(alert.figures, Figures::Deviation(_))).unwrap();
+    alert.json(&armed().view().surroundings(), MonoNs(1))
+}
+
+#[test]
+fn observation_has_a_line_when_its_alert_is_raised() {
+    let alert = raised(ObservedKind::OutsideTunnel);
+    let found = (alert.occurrences, alert.first_m, alert.worst_m, alert.setting.as_ref());
+    assert_eq!(found, (Some(3), Some(12.5), Some(0.4), None));
+    let number = alert.number;
+    let told = |change: AlertChange| LiveMessage::AlertChange { change, alert: Box::new(alert.clone()) };
+    assert!(told(AlertChange::Raised).adds_line() && !told(AlertChange::Rectified).adds_line());
+    let line = message_line(&told(AlertChange::Raised), &shapes::circle(3.0).unwrap(), &two());
+    let text = "raised: 0+012.50: samples 0.40 m outside the tunnel: check the tether's zero";
+    assert_eq!((line.place, line.what), (format!("ALERT {number}"), vec![text.to_owned()]));
 }
 
 #[test]

@@ -4,14 +4,12 @@
 use serde::Serialize;
 
 use super::alert_list::{ListedAlertJson, NoteJson};
-use super::alerts::Alert;
 use super::console::ConsoleCounts;
 use super::head_descriptions::HeadDescriptions;
 use super::other_targets::OtherTargetReport;
 use super::run::Loop;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
-use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};
 use headrace_geometry::time::MonoNs;
 
 mod advice;
@@ -37,7 +35,7 @@ pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 pub use unsure::NoVerdictReport;
 
 /// Version of the report schema.
-pub const REPORT_VERSION: u32 = 8;
+pub const REPORT_VERSION: u32 = 9;
 
 /// A whole report. The field names are a contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -79,8 +77,6 @@ pub struct Report {
     pub heads: HeadDescriptions,
     /// Declared openings of the wall, excluded from verdicts.
     pub openings: Vec<OpeningReport>,
-    /// Alerts about the dive as a whole.
-    pub alerts: Vec<AlertReport>,
     /// Alerts with their life cycle, in order of their numbers.
     pub alert_list: Vec<ListedAlertJson>,
     /// Number of cleared alerts left out for lack of room.
@@ -217,33 +213,6 @@ pub struct OpeningReport {
     pub arc_length_m: Option<f64>,
 }
 
-/// An alert about the dive as a whole.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AlertReport {
-    /// `outside_tunnel`, `profile_contradicted`, `head_scattered`, `head_constant`, `head_outvoted`, `cable_doubted` or
-    /// `setting_doubted`.
-    pub kind: &'static str,
-    /// Time of the alert's first occurrence, seconds on the log's clock.
-    pub since_s: f64,
-    /// Number of occurrences.
-    ///
-    /// An occurrence is a sample outside the tunnel, a judgement of a contradicting section, or the beginning
-    /// of distrust in a head or the cable counter.
-    pub count: u64,
-    /// Chainage of the alert's first occurrence, m.
-    pub x_m: f64,
-    /// Largest deviation, m.
-    ///
-    /// Outside the tunnel: distance from its end. Contradicted profile: mean deviation of a section from the
-    /// design. Head: mean difference between successive returns, constant range, or mean deviation from the
-    /// design. Cable counter: difference from the other source. Setting: 0.
-    pub worst_m: f64,
-    /// Id of the distrusted head, or of the velocity log that the cable counter differs from.
-    pub head: Option<String>,
-    /// Doubtful setting; `None` for other alerts.
-    pub setting: Option<SettingReport>,
-}
-
 /// Traffic of the operator's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct ConsoleReport {
@@ -253,25 +222,6 @@ pub struct ConsoleReport {
     pub invalid: u64,
     /// Number of commands without effect.
     pub without_effect: u64,
-}
-
-/// A setting that ranges contradict.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SettingReport {
-    /// `range_scale`, `head_turned`, `head_pitched`, `head_yawed`, `wrong_way_round` or `swapped`.
-    pub what: &'static str,
-    /// Name of the source; `None` if no single source has the setting.
-    pub source: Option<String>,
-    /// Name of the other source, for two swapped sources.
-    pub other: Option<String>,
-    /// Ratio of measured ranges to those of the design; `None` for other settings.
-    pub range_ratio: Option<f64>,
-    /// Angle to be added to the angle in the vehicle file, degrees; `None` for other settings.
-    ///
-    /// It is an angle about the head's axis, a pitch or a yaw.
-    pub angle_deg: Option<f64>,
-    /// Difference from the correct value, in standard deviations.
-    pub sure_ratio: f64,
 }
 
 impl Report {
@@ -302,7 +252,6 @@ impl Report {
             other_targets: Vec::new(),
             heads: dive.head_descriptions().clone(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
-            alerts: dive.view().alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
             alert_list: listed(dive),
             alerts_dropped: dive.view().alert_list().dropped(),
             notes: dive.view().notes().iter().map(NoteJson::from).collect(),
@@ -445,33 +394,5 @@ fn opening_report(opening: &Opening) -> OpeningReport {
         to_m: opening.to_m,
         arc_from_m: opening.arc_m.map(|(from_m, _)| from_m),
         arc_length_m: opening.arc_m.map(|(_, length_m)| length_m),
-    }
-}
-
-fn setting_report(doubt: &SettingDoubt, dive: &Loop) -> SettingReport {
-    let name = |source: u16| {
-        dive.sources().get(usize::from(source)).map_or_else(String::new, |info| info.id.clone())
-    };
-    let SettingDoubt { setting, source, sure_sd } = *doubt;
-    SettingReport {
-        what: setting.as_str(),
-        source: source.map(name),
-        other: setting.other().map(name),
-        range_ratio: matches!(setting, Setting::RangeScale(_)).then_some(1.0 + setting.figure()),
-        angle_deg: setting.angle_rad().map(f64::to_degrees),
-        sure_ratio: sure_sd,
-    }
-}
-
-fn alert_report(alert: &Alert, dive: &Loop) -> AlertReport {
-    let head = alert.source.and_then(|source| dive.sources().get(source.index()));
-    AlertReport {
-        kind: alert.kind.as_str(),
-        since_s: alert.since.as_secs_f64(),
-        count: alert.count,
-        x_m: alert.x_m,
-        worst_m: alert.worst_m,
-        head: head.map(|source| source.id.clone()),
-        setting: alert.setting.as_ref().map(|doubt| setting_report(doubt, dive)),
     }
 }

@@ -4,8 +4,8 @@ use bevy_ecs::prelude::{Res, ResMut};
 
 use super::survey::{Cursor, OutputRefs, Outputs, Requests};
 use crate::alert_list::RunInput;
-use crate::alerts::AlertKind;
 use crate::messages::Notice;
+use crate::observations::ObservedKind;
 use crate::resources::{Coverage, Digests, Finder, TunnelDesign};
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_coverage::{Judging, Request, RunChange, RunId, Section, Sections};
@@ -35,7 +35,7 @@ fn judge_one(
     outputs: &mut OutputRefs<'_>,
 ) {
     let Coverage { store, sections, unsure, lacks, .. } = coverage;
-    let OutputRefs { notices, runs, digests, alerts } = outputs;
+    let OutputRefs { notices, runs, digests, observations } = outputs;
     let begun = notices.len();
     let mut tell = |id: RunId, change: RunChange| {
         notices.push(Notice::Run { id, at: request.at, change });
@@ -59,9 +59,9 @@ fn judge_one(
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);
         let x_m = sections.bounds_m(request.section).0;
-        if alerts.note(AlertKind::ProfileContradicted, request.at, x_m, off_m) {
-            notices.push(Notice::Alert(AlertKind::ProfileContradicted, None));
-            digest_alert(digests, AlertKind::ProfileContradicted, None, request.at, (x_m, off_m));
+        let kind = ObservedKind::ProfileContradicted;
+        if observations.note(kind, request.at, x_m, off_m) {
+            digest_observation(digests, kind, None, request.at, (x_m, off_m));
         }
     }
 }
@@ -106,26 +106,26 @@ fn note_runs(notices: &[Notice], stop: (usize, bool), sections: &Sections, runs:
     }
 }
 
-/// Adds an alert to the digest: its chainage, its deviation, m, and its source if it names one.
-pub(crate) fn digest_alert(
+/// Adds an observation to the digest: its chainage, its deviation, m, and its source if it names one.
+pub(super) fn digest_observation(
     digests: &mut Digests,
-    kind: AlertKind,
+    kind: ObservedKind,
     source: Option<SourceId>,
     at: MonoNs,
     at_off_m: (f64, f64),
 ) {
-    let alert = digests.judgements.record(RecordKind::Alert).integer(at.0).integer(kind as u64);
-    alert.number(at_off_m.0).number(at_off_m.1);
+    let record = digests.judgements.record(RecordKind::Alert).integer(at.0).integer(kind as u64);
+    record.number(at_off_m.0).number(at_off_m.1);
     if let Some(source) = source {
-        alert.integer(u64::from(source.0));
+        record.integer(u64::from(source.0));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::alerts::Alerts;
     use crate::fixtures::{coverage, pipe};
+    use crate::observations::Observations;
     use headrace_coverage::{Judgement, Reach, Unsure};
 
     const AT: MonoNs = MonoNs(7_000_000_000);
@@ -149,7 +149,7 @@ mod tests {
             notices: &mut notices,
             runs: &mut runs,
             digests: &mut Digests::default(),
-            alerts: &mut Alerts::default(),
+            observations: &mut Observations::default(),
         };
         judge_one(&request, (&pipe(), (3, true)), coverage, &mut Finder::default(), &mut outputs);
         (notices, runs)

@@ -1,13 +1,13 @@
-//! Reports metres by verdict and active alerts at an update.
+//! Reports metres by verdict and the observations that hold at an update.
 
 use bevy_ecs::prelude::{Query, Res};
 
 use super::classify::{Class, Classified};
 use super::survey::{Cursor, Outputs};
-use crate::alerts::{AlertKind, Alerts};
 use crate::entities::{Head, HeadFrontier, Mounted};
-use crate::live_state::{ActiveAlert, ActiveAlerts, LiveMetres};
+use crate::live_state::{ActiveObservation, ActiveObservations, LiveMetres};
 use crate::messages::{Doubts, Placement, Standing};
+use crate::observations::{MOST_OBSERVATIONS, Observation, Observations, ObservedKind};
 use crate::placer::PlacedTick;
 use crate::resources::Coverage;
 use headrace_coverage::{Sections, Verdict};
@@ -19,7 +19,7 @@ use headrace_sensor::reading::SourceId;
 const SOON_S: f64 = 5.0;
 /// Speed at or below which the vehicle counts as going back, m/s.
 const ASTERN_MPS: f64 = -0.02;
-/// Time for which an alert about single occurrences stays active.
+/// Time for which an observation holds after its latest occurrence, if occurrences have no duration.
 const HOLDS: DurNs = DurNs(10_000_000_000);
 
 /// A head: number, source and reach.
@@ -51,39 +51,36 @@ pub(super) fn report_standing(
         unsure: coverage.unsure,
         passed: is_passed(&coverage, &heads, &update.situation),
         back_to_m: back_to_m(&coverage.sections, &update.situation),
-        alerts: active(update.at, &outputs.alerts, &update.doubts, &|source, kind| {
+        observations: active(update.at, &outputs.observations, &update.doubts, &|source, kind| {
             let mut heads = heads.iter().filter(|(_, mounted, _)| mounted.source == source);
             let why = |head: &Head| distrusted.get(head.0).copied().flatten();
-            heads.any(|(head, ..)| why(head).is_some_and(|why| AlertKind::of_distrust(why).0 == kind))
+            heads.any(|(head, ..)| why(head).is_some_and(|why| ObservedKind::of_distrust(why).0 == kind))
         }),
     };
     outputs.found.standings.push(standing);
 }
 
-/// Alerts that hold. `is_distrusted` tells whether a head is distrusted for the reason of a kind of alert.
+/// Observations that hold. `is_distrusted` tells whether a head is distrusted for the reason of a kind.
 fn active(
     at: MonoNs,
-    alerts: &Alerts,
+    observations: &Observations,
     doubts: &Doubts,
-    is_distrusted: &dyn Fn(SourceId, AlertKind) -> bool,
-) -> ActiveAlerts {
-    let mut active = [None; crate::alerts::MOST_ALERTS];
-    let holds = alerts.iter().filter(|alert| match alert.kind {
-        AlertKind::CableDoubted => doubts.cable.is_some_and(|doubt| doubt.log == alert.source),
-        AlertKind::SettingDoubted => doubts.setting.is_some(),
-        AlertKind::OutsideTunnel | AlertKind::ProfileContradicted => at.since(alert.latest).0 <= HOLDS.0,
-        kind @ (AlertKind::HeadScattered | AlertKind::HeadConstant | AlertKind::HeadOutvoted) => {
-            alert.source.is_some_and(|source| is_distrusted(source, kind))
+    is_distrusted: &dyn Fn(SourceId, ObservedKind) -> bool,
+) -> ActiveObservations {
+    let mut active = [None; MOST_OBSERVATIONS];
+    let holds = observations.iter().filter(|known| match known.kind {
+        ObservedKind::CableDoubted => doubts.cable.is_some_and(|doubt| doubt.log == known.source),
+        ObservedKind::SettingDoubted => doubts.setting.is_some(),
+        ObservedKind::OutsideTunnel | ObservedKind::ProfileContradicted => {
+            at.since(known.latest).0 <= HOLDS.0
+        }
+        kind @ (ObservedKind::HeadScattered | ObservedKind::HeadConstant | ObservedKind::HeadOutvoted) => {
+            known.source.is_some_and(|source| is_distrusted(source, kind))
         }
     });
-    for (slot, alert) in active.iter_mut().zip(holds) {
-        *slot = Some(ActiveAlert {
-            kind: alert.kind,
-            source: alert.source,
-            since: alert.latest,
-            x_m: alert.x_m,
-            worst_m: alert.worst_m,
-        });
+    for (slot, known) in active.iter_mut().zip(holds) {
+        let Observation { kind, source, occurrences, .. } = *known;
+        *slot = Some(ActiveObservation { kind, source, occurrences });
     }
     active
 }
@@ -198,20 +195,20 @@ mod tests {
         assert!(!passed(0..120, 0.4, None), "nothing is known without a position");
     }
 
-    /// A distrusted head has an alert for its own reason only.
+    /// A distrusted head has an observation for its own reason only.
     #[test]
-    fn distrusted_head_has_only_the_alert_for_its_reason() {
-        let kinds = [AlertKind::HeadScattered, AlertKind::HeadConstant, AlertKind::HeadOutvoted];
-        let (mut alerts, at) = (Alerts::default(), MonoNs(5));
+    fn distrusted_head_has_only_the_observation_for_its_reason() {
+        let kinds = [ObservedKind::HeadScattered, ObservedKind::HeadConstant, ObservedKind::HeadOutvoted];
+        let (mut observations, at) = (Observations::default(), MonoNs(5));
         for (source, kind) in (0..3).flat_map(|source| kinds.map(|kind| (SourceId(source), kind))) {
-            alerts.note_of(Some(source), kind, at, 1.0, 0.5);
+            observations.note_of(Some(source), kind, at, 1.0, 0.5);
         }
         let doubts = Doubts { cable: None, setting: None, stand_s: 0, hung: 0 };
         for (head, kind) in (0..3).zip(kinds) {
             let is_distrusted =
-                |source: SourceId, asked: AlertKind| source == SourceId(head) && asked == kind;
-            let found = active(at, &alerts, &doubts, &is_distrusted);
-            let found: Vec<_> = found.iter().flatten().map(|alert| (alert.source, alert.kind)).collect();
+                |source: SourceId, asked: ObservedKind| source == SourceId(head) && asked == kind;
+            let found = active(at, &observations, &doubts, &is_distrusted);
+            let found: Vec<_> = found.iter().flatten().map(|known| (known.source, known.kind)).collect();
             assert_eq!(found, [(Some(SourceId(head)), kind)]);
         }
     }

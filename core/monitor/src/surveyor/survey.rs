@@ -5,16 +5,16 @@ use bevy_ecs::system::SystemParam;
 
 use super::driving::Driving;
 use crate::alert_list::RunInput;
-use crate::alerts::Alerts;
 use crate::merge::MAX_TICK_PACKETS;
 use crate::messages::{Notice, Standing};
+use crate::observations::Observations;
 use crate::resources::{Coverage, Digests, Tally, Target};
 use headrace_coverage::Request;
 
 /// Maximum number of runs that change when one section is judged: its own run and two others.
 const RUNS_EACH: usize = 3;
-/// Notices per judged section: one for the section, one per run, and one for an alert.
-const NOTICES_EACH: usize = 2 + RUNS_EACH;
+/// Notices per judged section: one for the section, and one per run.
+const NOTICES_EACH: usize = 1 + RUNS_EACH;
 
 /// Place of the walk among the items of a tick.
 #[derive(Debug, Clone, Copy, Default, Resource)]
@@ -32,11 +32,11 @@ pub(super) struct Requests(pub(super) Vec<Request>);
 /// Findings of the surveyor in a tick.
 #[derive(Debug, Resource)]
 pub struct Found {
-    /// Metres by verdict and active alerts at each update, in order.
+    /// Metres by verdict and observations that hold at each update, in order.
     pub standings: Vec<Standing>,
     /// Changed runs, in order.
     pub(crate) runs: Vec<RunInput>,
-    /// Changed sections, changed runs and new alerts, in order.
+    /// Changed sections and runs, in order.
     pub notices: Vec<Notice>,
 }
 
@@ -75,7 +75,7 @@ pub(super) struct Survey<'w> {
 pub(super) struct Outputs<'w> {
     pub(super) found: ResMut<'w, Found>,
     pub(super) digests: ResMut<'w, Digests>,
-    pub(super) alerts: ResMut<'w, Alerts>,
+    pub(super) observations: ResMut<'w, Observations>,
 }
 
 /// References to [`Outputs`].
@@ -83,12 +83,12 @@ pub(super) struct OutputRefs<'a> {
     pub(super) notices: &'a mut Vec<Notice>,
     pub(super) runs: &'a mut Vec<RunInput>,
     pub(super) digests: &'a mut Digests,
-    pub(super) alerts: &'a mut Alerts,
+    pub(super) observations: &'a mut Observations,
 }
 
 impl Outputs<'_> {
     pub(super) fn refs(&mut self) -> OutputRefs<'_> {
         let Found { runs, notices, .. } = &mut *self.found;
-        OutputRefs { notices, runs, digests: &mut self.digests, alerts: &mut self.alerts }
+        OutputRefs { notices, runs, digests: &mut self.digests, observations: &mut self.observations }
     }
 }

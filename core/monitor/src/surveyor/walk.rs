@@ -8,7 +8,7 @@ use super::driving::Plan;
 use super::heads::Heads;
 use super::survey::{Outputs, Survey};
 use super::wall::{self, WallContext};
-use super::{count, coverage_extent, due, missing_samples, navigation_alerts, passages};
+use super::{count, coverage_extent, due, missing_samples, navigation_doubts, passages};
 use crate::entities::HeadEntities;
 use crate::messages::{PlacedPing, Placement, Update};
 use crate::placer::PlacedTick;
@@ -56,7 +56,7 @@ fn note_update(
     survey: &mut Survey<'_>,
     outputs: &mut Outputs<'_>,
 ) {
-    navigation_alerts::note(*at, situation, doubts, &mut outputs.refs());
+    navigation_doubts::note(*at, situation, doubts, &mut outputs.refs());
     let Survey { coverage, driving, requests, target, .. } = survey;
     let profile = &site.tunnel.profile;
     let healthy = driving.lacking.healthy(*at, situation, heads);

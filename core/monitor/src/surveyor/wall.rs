@@ -5,19 +5,19 @@ use bevy_ecs::system::SystemState;
 use bevy_ecs::world::World;
 
 use super::classify::Class;
-use super::judge::digest_alert;
+use super::judge::digest_observation;
 use super::missing_samples::number_of;
 use super::samples::note_sample;
 use super::survey::{OutputRefs, Outputs};
-use crate::alerts::AlertKind;
 use crate::entities::{HeadClassifier, HeadEntities, HeadSweep, Waiting};
-use crate::messages::{Aim, Hidden, Notice, Outcome, PlacedPing};
+use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
+use crate::observations::ObservedKind;
 use crate::resources::{Coverage, Digests, Tally, TunnelDesign};
 use crate::result_stream::RecordKind;
 use headrace_coverage::{Cause, Causes, Loss, MissingSample, StoreError, Taken};
 use headrace_geometry::frames::{Point3, Tunnel};
 
-/// Distance beyond either end of the tunnel from which samples raise an alert, m.
+/// Distance beyond either end of the tunnel from which samples are recorded as outside, m.
 const WELL_BEYOND_M: f64 = 1.0;
 
 /// Inputs and outputs, without the head.
@@ -58,12 +58,11 @@ pub(super) fn note_ping(
         Taken::Waits | Taken::Doubtful => doubtful(context, sweep, ping, *is_distrusted),
     }
     let (why, between_m) = sorted.distrusted?;
-    let (kind, figure_m) = AlertKind::of_distrust(why);
+    let (kind, figure_m) = ObservedKind::of_distrust(why);
     let source = Some(ping.source);
-    let OutputRefs { notices, digests, alerts, .. } = &mut context.outputs;
-    if alerts.note_of(source, kind, ping.received, point.x(), figure_m) {
-        notices.push(Notice::Alert(kind, source));
-        digest_alert(digests, kind, source, ping.received, (point.x(), figure_m));
+    let OutputRefs { digests, observations, .. } = &mut context.outputs;
+    if observations.note_of(source, kind, ping.received, point.x(), figure_m) {
+        digest_observation(digests, kind, source, ping.received, (point.x(), figure_m));
     }
     Some(between_m)
 }
@@ -121,11 +120,12 @@ fn settle(
 fn wall(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
     context.tally.samples += 1;
     digest(context.outputs.digests, ping, RecordKind::Sample);
+    let OutputRefs { digests, observations, .. } = &mut context.outputs;
+    let kind = ObservedKind::OutsideTunnel;
     if let Some(beyond_m) = beyond_end_m(ping, context.tunnel.length_m)
-        && context.outputs.alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
+        && observations.note(kind, ping.received, beyond_m.0, beyond_m.1)
     {
-        context.outputs.notices.push(Notice::Alert(AlertKind::OutsideTunnel, None));
-        digest_alert(context.outputs.digests, AlertKind::OutsideTunnel, None, ping.received, beyond_m);
+        digest_observation(digests, kind, None, ping.received, beyond_m);
     }
     store(context, sweep, ping);
 }
@@ -214,16 +214,15 @@ mod tests {
     use super::super::classify::classify;
     use super::super::survey::Found;
     use super::*;
-    use crate::alerts::Alerts;
     use crate::fixtures::{coverage, heard, pinged, tunnel};
+    use crate::observations::Observations;
     use headrace_coverage::{HeadWall, Relief, SampleStore, StoreLayout};
 
     struct Bench {
         coverage: Coverage,
         tunnel: TunnelDesign,
         tally: Tally,
-        notices: Vec<Notice>,
-        alerts: Alerts,
+        observations: Observations,
         digests: Digests,
         head: HeadWall,
         relief: Relief,
@@ -236,8 +235,7 @@ mod tests {
                 coverage: coverage(),
                 tunnel: tunnel(),
                 tally: Tally::default(),
-                notices: Vec::new(),
-                alerts: Alerts::default(),
+                observations: Observations::default(),
                 digests: Digests::default(),
                 head: HeadWall::default(),
                 relief: Relief::default(),
@@ -250,10 +248,10 @@ mod tests {
         fn note(&mut self, ping: &PlacedPing) -> (u64, u64) {
             let class = classify(&mut self.head, ping, &self.tunnel, &mut self.relief);
             let outputs = OutputRefs {
-                notices: &mut self.notices,
+                notices: &mut Vec::new(),
                 runs: &mut Vec::new(),
                 digests: &mut self.digests,
-                alerts: &mut self.alerts,
+                observations: &mut self.observations,
             };
             let (coverage, tally) = (&mut self.coverage, &mut self.tally);
             let mut context = WallContext { coverage, tunnel: &self.tunnel, tally, outputs };
@@ -367,19 +365,20 @@ mod tests {
     }
 
     #[test]
-    fn return_beyond_the_tunnel_is_reported_once_with_its_distance() {
+    fn returns_beyond_the_tunnel_are_counted_with_their_largest_distance() {
         let mut bench = Bench::new();
         let mut note = |x_m: f64| {
             bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });
-            let alert = bench.alerts.get(AlertKind::OutsideTunnel, None).copied();
-            (alert.map(|alert| alert.worst_m), bench.notices.len())
+            assert!(bench.observations.iter().all(|known| known.kind == ObservedKind::OutsideTunnel));
+            bench.observations.iter().map(|known| known.occurrences).collect::<Vec<_>>()
         };
-        assert_eq!(note(29.9), (None, 0));
-        assert_eq!(note(30.9), (None, 0), "heads reach beyond the end");
-        let (worst_m, told) = note(31.1);
-        assert!((worst_m.unwrap() - 1.1).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
-        let (worst_m, told) = note(31.5);
-        assert!((worst_m.unwrap() - 1.5).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
+        assert_eq!(note(29.9), []);
+        assert_eq!(note(30.9), [], "heads reach beyond the end");
+        for (x_m, count, beyond_m) in [(31.1, 1, 1.1), (31.5, 2, 1.5)] {
+            let [found] = note(x_m)[..] else { panic!("{x_m}") };
+            assert!((found.worst_m - beyond_m).abs() < 1e-9 && found.count == count, "{found:?}");
+            assert!((found.first_m - 31.1).abs() < 1e-9, "{found:?}");
+        }
         assert_eq!((bench.tally.samples, bench.tally.outside), (4, 0));
         bench.note(&PlacedPing { new_sweep: true, ..heard(33.0, 1.0, 3.0) });
         assert_eq!((bench.tally.samples, bench.tally.outside), (5, 1), "beyond the store");
@@ -398,7 +397,7 @@ mod tests {
         world.insert_resource(bench.tunnel);
         world.insert_resource(bench.tally);
         world.insert_resource(bench.digests);
-        world.insert_resource(bench.alerts);
+        world.insert_resource(bench.observations);
         end_returns(&mut world);
         let tally = *world.resource::<Tally>();
         assert_eq!((tally.samples, tally.doubtful), (1, 1));

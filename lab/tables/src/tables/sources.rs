@@ -76,59 +76,82 @@ pub(crate) fn alerts() -> Table<ListedAlertJson> {
     Table {
         name: "alerts",
         about: "An alert and its life at the end of the dive ([alerts.md](alerts.md)).",
-        columns: vec![
-            Column("number", "Its number, from 1", Get::Count(|row| count(row.number))),
-            Column(
-                "priority",
-                "`emergency_alarm`, `alarm`, `warning` or `caution`",
-                Get::Text(|row| Some(row.priority.to_owned())),
-            ),
-            Column(
-                "class",
-                "`coverage`, `speed`, `position`, `sensor`, `recording` or `setting`",
-                Get::Text(|row| Some(row.class.to_owned())),
-            ),
-            Column("kind", "Its kind", Get::Text(|row| Some(row.kind.to_owned()))),
-            Column("text", "Text of the alert", Get::Text(|row| Some(row.text.clone()))),
-            Column("state", "`active`, `rectified` or `cleared`", Get::Text(state)),
-            Column(
-                "since_s",
-                "Time at which it was raised first, s on the log's clock",
-                Get::Number(|row| Some(row.since_s)),
-            ),
-            Column(
-                "rectified_s",
-                "Time at which its situation ended, s on the log's clock",
-                Get::Number(|row| row.rectified_s),
-            ),
-            Column(
-                "cleared_s",
-                "Time at which it was cleared, s on the log's clock",
-                Get::Number(|row| row.cleared_s),
-            ),
-            Column(
-                "acknowledged_s",
-                "Time of its acknowledgement, s on the log's clock",
-                Get::Number(|row| Some(row.acknowledged.as_ref()?.at_s)),
-            ),
-            Column(
-                "acknowledged_by",
-                "Name given with the acknowledgement",
-                Get::Text(|row| Some(row.acknowledged.as_ref()?.by.clone())),
-            ),
-            Column("from_m", "Chainage of its start, or of the vehicle, m", Get::Number(|row| row.from_m)),
-            Column("to_m", "Chainage of its end, m", Get::Number(|row| row.to_m)),
-            Column("source", "Sensor of the alert", Get::Text(|row| row.sensor.clone())),
-            Column(
-                "count",
-                "Times that it was raised; for missed stretches, the number of stretches that it covers",
-                Get::Count(|row| count(row.count)),
-            ),
-            Column(
-                "merged_into",
-                "The alert into which it was merged",
-                Get::Count(|row| row.merged_into.map(i64::from)),
-            ),
-        ],
+        columns: life_columns().into_iter().chain(extent_columns()).collect(),
     }
+}
+
+/// Columns of an alert's kind and life.
+fn life_columns() -> Vec<Column<ListedAlertJson>> {
+    vec![
+        Column("number", "Its number, from 1", Get::Count(|row| count(row.number))),
+        Column(
+            "priority",
+            "`emergency_alarm`, `alarm`, `warning` or `caution`",
+            Get::Text(|row| Some(row.priority.to_owned())),
+        ),
+        Column(
+            "class",
+            "`coverage`, `speed`, `position`, `sensor`, `recording` or `setting`",
+            Get::Text(|row| Some(row.class.to_owned())),
+        ),
+        Column("kind", "Its kind", Get::Text(|row| Some(row.kind.to_owned()))),
+        Column("text", "Text of the alert", Get::Text(|row| Some(row.text.clone()))),
+        Column("state", "`active`, `rectified` or `cleared`", Get::Text(state)),
+        Column(
+            "since_s",
+            "Time at which it was raised first, s on the log's clock",
+            Get::Number(|row| Some(row.since_s)),
+        ),
+        Column(
+            "rectified_s",
+            "Time at which its situation ended, s on the log's clock",
+            Get::Number(|row| row.rectified_s),
+        ),
+        Column(
+            "cleared_s",
+            "Time at which it was cleared, s on the log's clock",
+            Get::Number(|row| row.cleared_s),
+        ),
+        Column(
+            "acknowledged_s",
+            "Time of its acknowledgement, s on the log's clock",
+            Get::Number(|row| Some(row.acknowledged.as_ref()?.at_s)),
+        ),
+        Column(
+            "acknowledged_by",
+            "Name given with the acknowledgement",
+            Get::Text(|row| Some(row.acknowledged.as_ref()?.by.clone())),
+        ),
+    ]
+}
+
+/// Columns of an alert's place, extent and occurrences.
+fn extent_columns() -> Vec<Column<ListedAlertJson>> {
+    vec![
+        Column("from_m", "Chainage of its start, or of the vehicle, m", Get::Number(|row| row.from_m)),
+        Column("to_m", "Chainage of its end, m", Get::Number(|row| row.to_m)),
+        Column("source", "Sensor of the alert", Get::Text(|row| row.sensor.clone())),
+        Column(
+            "count",
+            "Times that it was raised; for missed stretches, the number of stretches that it covers",
+            Get::Count(|row| count(row.count)),
+        ),
+        Column(
+            "occurrences",
+            "Occurrences of the doubt that it reports; empty for other alerts",
+            Get::Count(|row| count(row.occurrences?)),
+        ),
+        Column("first_m", "Chainage of the first occurrence, m", Get::Number(|row| row.first_m)),
+        Column("worst_m", "Largest deviation, m; 0 for a doubtful setting", Get::Number(|row| row.worst_m)),
+        Column(
+            "setting",
+            "Kind of the doubtful setting",
+            Get::Text(|row| Some(row.setting.as_ref()?.what.to_owned())),
+        ),
+        Column(
+            "merged_into",
+            "The alert into which it was merged",
+            Get::Count(|row| row.merged_into.map(i64::from)),
+        ),
+    ]
 }

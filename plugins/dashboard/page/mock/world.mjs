@@ -34,7 +34,7 @@ export class World {
   }
 
   hello() {
-    return { type: "hello", version: 1, program: "headrace mock", instance: this.instance, mode: this.mode, dive: "made-up dive",
+    return { type: "hello", version: 2, program: "headrace mock", instance: this.instance, mode: this.mode, dive: "made-up dive",
       vehicle: "mock", target_m: dive.TARGET_M, section_m: dive.SECTION_M, confidence_sd: 2, length_m: this.length_m,
       perimeter_m: dive.PERIMETER_M, profile: dive.PROFILE, clock_arc_m: dive.CLOCK_ARC_M,
       heads: SENSORS.slice(0, 4).map(({ id }, source) => ({ id, source, hidden_deg: source < 2 ? [[100, 125]] : [[235, 260]] })),
@@ -159,7 +159,7 @@ export class World {
     const predicted = round(0.5 * (this.speed_mps / this.v_max_mps) ** 0.8);
     const missed = Math.floor(x / 137) * 6.25, unsure = Math.floor(x / 411) * 14;
     const yaw = 2 * Math.sin(this.t_s / 7);
-    return { type: "state", version: 1, t_s: round(this.t_s), text: "", now_s: round(this.t_s), at_s: round(this.t_s), age_s: 0.02, old: false,
+    return { type: "state", version: 2, t_s: round(this.t_s), text: "", now_s: round(this.t_s), at_s: round(this.t_s), age_s: 0.02, old: false,
       condition, lamp,
       position: { state: none ? "none" : this.position, why: none ? "no_heading" : this.position === "doubtful" ? "cable" : null,
         chainage_m: none ? null : round(x), station: none ? null : station(x), chainage_sd_m: none ? null : 0.31, place_sd_m: none ? null : 0.04,
@@ -169,7 +169,7 @@ export class World {
       turn: none ? null : { target_m: dive.TARGET_M, predicted_t_m: predicted, will_exceed: predicted > dive.TARGET_M, t_y_m: 0.29, pass_gap_s: 1, phase_error_deg: 2 },
       sensors: SENSORS.map(({ id }, n) => ({ id, state: this.dead.has(id) && age(id) > 2 ? "silent" : "ok", age_s: age(id), is_head: n < 4 })),
       metres: { pass_m: round(x - missed - unsure - 1.8, 2), fail_m: missed, cannot_say_m: unsure, open_m: 0.8, not_inspected_m: 1, way_m: round(x, 2) },
-      cannot_say: null, alerts: [],
+      cannot_say: null,
       alert_counts: { unacknowledged: this.alerts.filter((a) => a.needs_acknowledgement && !a.acknowledged).length, active: this.alerts.length },
       alert_list: this.alerts.slice(-64), alerts_hidden: Math.max(0, this.alerts.length - 64),
       left: { cable_m: round(7400 - x, 1), time_s: Math.max(0, 40_000 - (this.t_s - dive.BEGUN_S)), battery_pct: 63 },

@@ -33,8 +33,7 @@ use headrace_coverage::{Again, Cause, Causes, Failing, Verdict};
 use headrace_fusion::NoFix;
 use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::alerts::AlertKind;
-use headrace_monitor::pilot_text::{AdviceFigures, CauseFigures, advice_text, alert_text};
+use headrace_monitor::pilot_text::{AdviceFigures, CauseFigures, advice_text, recorded_observation_text};
 use headrace_monitor::result_stream::{Record, RecordKind, first_record, text_of};
 use headrace_sampling::advice::{Reason, Remedy};
 use headrace_sampling::head::HeadSet;
@@ -117,7 +116,7 @@ impl View {
                 self.sections.run(words.integer()?, words.integer()?);
                 Some(())
             }
-            RecordKind::Alert => self.alert(&mut words, made),
+            RecordKind::Alert => self.observation(&mut words, made),
             RecordKind::Advice => self.advice(&mut words, made),
             // Viewers get only samples. Doubtful returns, live states and the list of alerts are in the log's
             // results.
@@ -290,14 +289,15 @@ impl View {
         Some(())
     }
 
-    /// Publishes an alert about the dive as a whole, or about a head.
-    fn alert(&self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
+    /// Publishes an observation about the dive as a whole, or about a head.
+    fn observation(&self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
         let at = MonoNs(words.integer()?);
-        let kind = words.one_of(&AlertKind::ALL, |kind| kind as u64)?;
+        let kind = words.integer()?;
         let [x_m, off_m] = words.numbers()?;
         let head = words.integer().and_then(|source| self.site.heads.iter().position(|head| *head == source));
         let head = head.map_or_else(String::new, |head| format!("head {}", head + 1));
-        made.push(Topic::Alerts, &Log::new(at, Level::Error, alert_text(kind, &head, x_m, off_m)));
+        let text = recorded_observation_text(kind, &head, x_m, off_m)?;
+        made.push(Topic::Alerts, &Log::new(at, Level::Error, text));
         Some(())
     }
 }
