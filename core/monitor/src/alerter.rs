@@ -8,6 +8,7 @@ use super::live_state::{LiveMetres, LiveState, PositionDoubt, PositionState, sou
 use super::merge::MAX_TICK_PACKETS;
 use super::messages::{Event, Notice, PlacedItem, Placement, Standing, Update};
 use super::notes::{Note, Notes, Spoken};
+use super::observations::Observations;
 use super::placer::Placed;
 use super::result_stream::{RecordKind, ResultStream};
 use super::surveyor::Found;
@@ -87,6 +88,13 @@ impl Alerter {
     pub(super) fn take_runs_at_end(&mut self, runs: &[RunInput]) {
         self.notices.clear();
         runs.iter().for_each(|run| self.take_run(run));
+    }
+
+    /// Takes the observations after the last judgement of a dive.
+    pub(super) fn take_observations_at_end(&mut self, observations: &Observations, at: MonoNs) {
+        self.notices.clear();
+        let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
+        self.list.take_observations_at_end(observations, at, &mut to);
     }
 
     fn update(&mut self, update: &Update, advice: &Advice, standing: &Standing) {

@@ -291,6 +291,16 @@ impl Loop {
                 hear(notice, self);
             }
         }
+        self.list_last_observations(hear);
+    }
+
+    /// Lists the observations made at the end of a dive.
+    fn list_last_observations(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
+        let at = self.last_packet();
+        self.alerter.take_observations_at_end(self.surveyor.observations(), at);
+        for notice in &self.alerter.notices {
+            hear(notice, self);
+        }
     }
 
     /// Snapshot of the state after the last tick.

@@ -121,6 +121,11 @@ impl Surveyor {
         self.part.world.resource()
     }
 
+    /// Observations about the dive as a whole.
+    pub(super) fn observations(&self) -> &Observations {
+        self.part.world.resource()
+    }
+
     /// Result streams.
     pub fn digests(&self) -> &Digests {
         self.part.world.resource()

@@ -7,7 +7,7 @@ use super::{AlertList, AlertState, Figures, ListKind, Priority, Telling};
 use crate::live_state::{
     ActiveObservation, Condition, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState,
 };
-use crate::observations::ObservedKind;
+use crate::observations::{Observations, ObservedKind};
 use crate::pilot_text::AdviceFigures;
 use headrace_coverage::{Stretch, Unsure};
 use headrace_fusion::filter::setting_check::SettingDoubt;
@@ -180,6 +180,28 @@ impl AlertList {
                     (None, _) => Figures::None,
                 };
                 self.observe(at, &Seen { kind, source, holds: found.is_some(), figures }, to);
+            }
+        }
+    }
+
+    /// Adds the observations made at the end of a dive, without a hold time.
+    ///
+    /// If an observation has an alert already, only the alert's figures change.
+    pub(crate) fn take_observations_at_end(
+        &mut self,
+        observations: &Observations,
+        at: MonoNs,
+        to: &mut Telling<'_>,
+    ) {
+        let is_made_at_end = |kind: ObservedKind| {
+            matches!(kind, ObservedKind::OutsideTunnel | ObservedKind::ProfileContradicted)
+        };
+        for known in observations.iter().filter(|known| is_made_at_end(known.kind)) {
+            let (kind, figures) = (ListKind::from(known.kind), Figures::Deviation(known.occurrences));
+            if let Some(alert) = self.alerts.iter_mut().rfind(|alert| alert.kind == kind) {
+                alert.figures = figures;
+            } else {
+                self.raise(kind, None, (at, figures), None, to);
             }
         }
     }

@@ -2,7 +2,7 @@ use super::conditions::Seen;
 use super::*;
 use crate::live_state::ActiveObservation;
 use crate::messages::Notice;
-use crate::observations::ObservedKind;
+use crate::observations::{Observations, ObservedKind};
 use crate::result_stream::ResultStream;
 use headrace_coverage::{RunChange, RunId};
 use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _};
@@ -312,6 +312,23 @@ fn occurrences_update_the_figures_without_a_notice() {
     let alert = bench.list.iter().find(|alert| alert.kind == ListKind::ProfileContradicted).unwrap();
     assert_eq!(alert.figures, Figures::Deviation(second));
     assert_eq!((bench.notices.len(), bench.stream.value()), (notices, digest));
+}
+
+#[test]
+fn contradiction_found_at_the_end_of_a_dive_has_one_alert() {
+    let mut bench = Bench::new(1.0, 5.0);
+    let (mut observations, at) = (Observations::default(), MonoNs(9));
+    observations.note(ObservedKind::ProfileContradicted, at, 7.0, 0.4);
+    observations.note_of(Some(SourceId(1)), ObservedKind::HeadConstant, at, 7.0, 0.4);
+    for (count, worst_m) in [(1, 0.4), (2, 0.5)] {
+        bench.with(|list, to| list.take_observations_at_end(&observations, at, to));
+        let alerts: Vec<_> =
+            bench.list.iter().map(|alert| (alert.kind, alert.since, alert.figures)).collect();
+        let figures = Figures::Deviation(Occurrences { count, first_m: 7.0, worst_m });
+        assert_eq!(alerts, [(ListKind::ProfileContradicted, at, figures)]);
+        observations.note(ObservedKind::ProfileContradicted, at, 8.0, 0.5);
+    }
+    assert_eq!(bench.notices.len(), 1);
 }
 
 #[test]
