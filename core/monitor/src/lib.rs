@@ -17,7 +17,7 @@
 //! let consumed_packets = dive.tick(MonoNs(20_000_000));
 //! assert_eq!((consumed_packets, dive.ticks()), (0, 1));
 //! // 100 m of tunnel in sections of 0.25 m.
-//! assert_eq!(dive.coverage().sections.len(), 400);
+//! assert_eq!(dive.view().coverage().sections.len(), 400);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

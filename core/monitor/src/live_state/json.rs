@@ -152,7 +152,7 @@ pub struct StretchJson {
 
 impl LiveState {
     /// The state in JSON, with the alerts of the same dive. See
-    /// [`Loop::live_state_json`](crate::run::Loop::live_state_json).
+    /// [`DiveView::live_state_json`](crate::view::DiveView::live_state_json).
     pub fn json(&self, around: &TextContext<'_>, alerts: &AlertList) -> LiveStateJson {
         let TextContext { sources, section_m, .. } = *around;
         let (shown, alerts_hidden) = alerts.shown();

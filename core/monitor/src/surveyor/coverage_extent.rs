@@ -64,6 +64,7 @@ fn note_silence(coverage: &mut Coverage, head: usize, before: Option<Reach>, her
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
     use crate::fixtures::{coverage, mount, situation, tunnel};
     use bevy_ecs::system::SystemState;
     use bevy_ecs::world::World;
