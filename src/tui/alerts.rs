@@ -4,6 +4,7 @@ use headrace_monitor::alert_list::{AlertState, ListedAlert, Priority};
 use headrace_monitor::console::{Command, ConsolePort, NoteText, Who};
 use headrace_monitor::live_state::Lamp;
 use headrace_monitor::run::Loop;
+use headrace_monitor::words::priority_word;
 
 /// Author of the commands from this screen.
 const BY: &str = "terminal";
@@ -28,12 +29,7 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
     let (shown, hidden) = dive.view().alert_list().shown();
     let row = |alert: &&ListedAlert| AlertRow {
         number: alert.number,
-        priority: match alert.priority {
-            Priority::EmergencyAlarm => "EMERGENCY",
-            Priority::Alarm => "ALARM",
-            Priority::Warning => "WARNING",
-            Priority::Caution => "CAUTION",
-        },
+        priority: priority_word(alert.priority),
         state: match (alert.state, alert.needs_acknowledgement()) {
             (AlertState::Active, true) => "NEW",
             (AlertState::Active, false) => "active",

@@ -3,9 +3,11 @@
 use std::collections::VecDeque;
 
 use headrace_config::plain::one_line;
+use headrace_coverage::Verdict;
 use headrace_geometry::time::DurNs;
 use headrace_monitor::live_state::{Condition, Lamp, SensorState};
 use headrace_monitor::live_text::PilotLine;
+use headrace_monitor::words::{NOT_INSPECTED, UNSEEN, verdict_words};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
@@ -296,13 +298,14 @@ impl Page {
             "Ctrl-C ends the dive; twice ends the program".to_owned(),
             String::new(),
             "wall: bar height is hole / target".to_owned(),
-            if self.ink.unicode {
-                "✖ missed  ? can't say  ~ open"
-            } else {
-                "X missed  ? can't say  ~ open"
-            }
-            .to_owned(),
-            "o not inspected  . unseen  ^ vehicle".to_owned(),
+            format!(
+                "{} {}  ? {}  ~ {}",
+                if self.ink.unicode { '✖' } else { 'X' },
+                verdict_words(Verdict::Fail),
+                verdict_words(Verdict::CannotSay),
+                verdict_words(Verdict::Open)
+            ),
+            format!("o {NOT_INSPECTED}  . {UNSEEN}  ^ vehicle"),
         ];
         if self.playing.is_some() {
             lines.push(String::new());

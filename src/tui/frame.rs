@@ -11,6 +11,7 @@ use headrace_monitor::live_text::{PilotLine, message_line, status_line};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::pilot_text::{AdviceFigures, advice_text};
 use headrace_monitor::run::Loop;
+use headrace_monitor::words::limit_words;
 use headrace_ports::{Phase, Status};
 use headrace_sampling::advice::{Advice, Reason};
 
@@ -223,7 +224,7 @@ fn reason_text(
 ) -> String {
     let is_told = matches!(state.condition(), Condition::TurnFails | Condition::NoSpeed);
     if advice.reason == Reason::HelixPitch && !is_told {
-        return "the distance between turns limits the speed".to_owned();
+        return format!("the {} limits the speed", limit_words(advice.reason));
     }
     advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile, heads)
 }

@@ -1,10 +1,12 @@
 //! Panels of the screen.
 
 use headrace_config::plain::one_line;
+use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 use headrace_monitor::live_state::{Condition, Lamp, LiveMetres, PositionState, SensorState};
 use headrace_monitor::pilot_text::station;
+use headrace_monitor::words::{NOT_INSPECTED, sensor_words as state_words, verdict_words};
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
@@ -125,12 +127,13 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
 /// Metres by verdict, with those that haven't passed first. Dots stand for omitted ones.
 fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
+    let missed = verdict_words(Verdict::Fail).to_uppercase();
     let all = [
-        (fail_m, "MISSED"),
-        (cannot_say_m, "can't say"),
-        (not_inspected_m, "not inspected"),
-        (pass_m, "passed"),
-        (open_m, "open"),
+        (fail_m, missed.as_str()),
+        (cannot_say_m, verdict_words(Verdict::CannotSay)),
+        (not_inspected_m, NOT_INSPECTED),
+        (pass_m, verdict_words(Verdict::Pass)),
+        (open_m, verdict_words(Verdict::Open)),
     ];
     let mut text = format!("{:.2} m:", metres.way_m());
     for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
@@ -268,15 +271,15 @@ fn sensor_words(sensor: &SensorRow, long: bool) -> (String, Lamp) {
     let SensorRow { id, state, age, rate_hz, why } = sensor;
     let age = age.map_or_else(String::new, age_text);
     let rate = rate_hz.map_or_else(String::new, |hz| format!(" {hz:.0}/s"));
+    let name = state_words(*state);
     let (words, lamp) = match state {
         SensorState::Ok if long => (format!("{id}{rate} {age}"), Lamp::Green),
         SensorState::Ok => (format!("{id}{rate}"), Lamp::Green),
-        SensorState::Silent => (format!("{id} SILENT {age}"), Lamp::Red),
-        SensorState::Never => (format!("{id} no data yet"), Lamp::Red),
-        SensorState::Stalled => (format!("{id} doesn't turn"), Lamp::Red),
-        SensorState::Hung => (format!("{id} stuck"), Lamp::Red),
-        SensorState::Deaf => (format!("{id} detects no wall"), Lamp::Red),
-        SensorState::Distrusted => (format!("{id} not trusted"), Lamp::Amber),
+        SensorState::Silent => (format!("{id} {} {age}", name.to_uppercase()), Lamp::Red),
+        SensorState::Never | SensorState::Stalled | SensorState::Hung | SensorState::Deaf => {
+            (format!("{id} {name}"), Lamp::Red)
+        }
+        SensorState::Distrusted => (format!("{id} {name}"), Lamp::Amber),
     };
     let why = if long && !why.is_empty() { format!(": {why}") } else { String::new() };
     (words + &why, lamp)

@@ -67,6 +67,7 @@ pub mod surveyor;
 pub mod unsure_stretch;
 pub mod view;
 pub mod voice;
+pub mod words;
 
 pub use app::{App, Plugin};
 pub use error::PluginError;

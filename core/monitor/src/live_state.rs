@@ -42,6 +42,16 @@ pub enum PositionDoubt {
     Spread,
 }
 
+impl PositionDoubt {
+    /// Word used in JSON.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Cable => "cable",
+            Self::Spread => "spread",
+        }
+    }
+}
+
 /// Availability of a position.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum PositionState {
@@ -128,6 +138,21 @@ pub enum SensorState {
     Distrusted,
     /// Readings arrive.
     Ok,
+}
+
+impl SensorState {
+    /// Word used in JSON.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Never => "never",
+            Self::Silent => "silent",
+            Self::Stalled => "stalled",
+            Self::Deaf => "deaf",
+            Self::Hung => "hung",
+            Self::Distrusted => "distrusted",
+            Self::Ok => "ok",
+        }
+    }
 }
 
 /// The live state. Speeds are in m/s, lengths in m.

@@ -4,10 +4,10 @@ use super::alert_list::{AlertChange, ListedAlertJson};
 use super::head_descriptions::HeadDescriptions;
 use super::live_messages::LiveMessage;
 use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt, SensorState};
-use super::pilot_text::{
-    AdviceFigures, actions_text, advice_text, cause_text, clock_text, no_position_text, station,
-};
+use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, clock_text, station};
 pub use super::unsure_stretch::{helps_text, unsure_text};
+use super::words::{NOT_INSPECTED, STAND_STILL, STARTING, condition_words, sensor_words, verdict_words};
+use headrace_coverage::Verdict;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
@@ -109,27 +109,12 @@ pub fn status_line(
     let is_over = matches!(condition, Condition::TooFast | Condition::Over | Condition::TurnUnsure);
     let decimals = if is_over { speed_decimals(state.speed_mps, state.v_max_mps()) } else { 2 };
     let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.decimals$} m/s"));
-    let (what, action) = match condition {
-        Condition::NoData => (waiting_text(state).to_owned(), String::new()),
-        Condition::Old(age) => (format!("OLD {}: nothing from any sensor", age_text(age)), "stop".to_owned()),
-        Condition::NoPosition(lacking) => (no_position_text(lacking).to_owned(), "hold still".to_owned()),
-        Condition::Outside(end_m) => {
-            let which = if state.chainage_m.is_some_and(|x_m| x_m < end_m) { "begins" } else { "ends" };
-            (format!("OUTSIDE: the tunnel {which} at {}", station(end_m)), String::new())
-        }
-        Condition::NoSonar => ("NO SONAR: no returns".to_owned(), "stop".to_owned()),
-        Condition::Passed => ("passed here".to_owned(), String::new()),
-        Condition::GoingBack(to_m) => (format!("going back to {}", station(to_m)), String::new()),
-        Condition::NoSpeed => (no_speed_text(state, profile, heads), String::new()),
-        Condition::TooFast => ("TOO FAST".to_owned(), format!("at most {v_max}")),
-        Condition::TurnFails => (turn_text("THIS TURN MISSES", state), format!("go {v_max}")),
-        Condition::CannotSay(PositionDoubt::Spread) if state.asks_to_stand() => {
-            (doubt_text(PositionDoubt::Spread, state), format!("stand still {} s", state.stand_s))
-        }
-        Condition::CannotSay(doubt) => (doubt_text(doubt, state), format!("at most {v_max}")),
-        Condition::Over => ("a little fast".to_owned(), format!("at most {v_max}")),
-        Condition::TurnUnsure => (turn_text("THIS TURN MAY MISS", state), format!("go {v_max}")),
-        Condition::Good => (format!("ok up to {v_max}"), String::new()),
+    let what = condition_text(condition, state, &v_max, (profile, heads));
+    let action = match condition {
+        _ if state.asks_to_stand() => format!("{STAND_STILL} {} s", state.stand_s),
+        // The text states v_max already.
+        Condition::Good => String::new(),
+        _ => condition_words(condition).action_text(&v_max),
     };
     let is_old = matches!(condition, Condition::Old(_) | Condition::NoData);
     let speed = match state.speed_mps {
@@ -142,19 +127,24 @@ pub fn status_line(
     let mut parts = vec![what];
     // Failed metres come first, since a narrow screen leaves out the last parts.
     if state.metres.fail_m > 0.0 {
-        parts.push(format!("missed {:.2} m", state.metres.fail_m));
+        parts.push(format!("{} {:.2} m", verdict_words(Verdict::Fail), state.metres.fail_m));
     }
     if !is_old {
         let silent: Vec<usize> = state.silent().collect();
         match silent.as_slice() {
             [] => {}
-            [one] => parts.push(format!("{} silent", name(*one))),
-            some => parts.push(format!("{} of {} sensors silent", some.len(), state.sources)),
+            [one] => parts.push(format!("{} {}", name(*one), sensor_words(SensorState::Silent))),
+            some => parts.push(format!(
+                "{} of {} sensors {}",
+                some.len(),
+                state.sources,
+                sensor_words(SensorState::Silent)
+            )),
         }
-        let deaf = state.sensors_that_are(SensorState::Deaf);
-        parts.extend(deaf.map(|source| format!("{} detects no wall", name(source))));
-        let hung = state.sensors_that_are(SensorState::Hung);
-        parts.extend(hung.map(|source| format!("{} stuck", name(source))));
+        for ill in [SensorState::Deaf, SensorState::Hung] {
+            let sensors = state.sensors_that_are(ill);
+            parts.extend(sensors.map(|source| format!("{} {}", name(source), sensor_words(ill))));
+        }
         let forecast = losses_text(state).or_else(|| forecast_text(state));
         let any_speed =
             matches!(condition, Condition::Passed | Condition::GoingBack(_) | Condition::Outside(_));
@@ -162,6 +152,38 @@ pub fn status_line(
         parts.extend(forecast.filter(|_| counts));
     }
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
+}
+
+/// Condition with its explanation. `v_max` is v_max with its unit.
+fn condition_text(
+    condition: Condition,
+    state: &LiveState,
+    v_max: &str,
+    (profile, heads): (&Profile, &HeadDescriptions),
+) -> String {
+    let words = condition_words(condition);
+    match condition {
+        Condition::NoData if state.heard.iter().any(Option::is_some) => STARTING.to_owned(),
+        Condition::Old(age) => format!("{} {}: {}", words.name, age_text(age), words.detail),
+        Condition::Outside(end_m) => {
+            let which = if state.chainage_m.is_some_and(|x_m| x_m < end_m) { "begins" } else { "ends" };
+            format!("{}: the tunnel {which} at {}", words.name, station(end_m))
+        }
+        Condition::Passed => words.name.to_owned(),
+        Condition::GoingBack(to_m) => format!("{} to {}", words.name, station(to_m)),
+        Condition::NoSpeed => no_speed_text(state, profile, heads),
+        Condition::TurnFails | Condition::TurnUnsure => turn_text(words.name, state),
+        Condition::CannotSay(PositionDoubt::Spread) => {
+            format!("{}: position ±{:.2} m", words.name, state.confidence_sd * state.pass_sd_m)
+        }
+        Condition::Good => format!("ok up to {v_max}"),
+        Condition::NoData
+        | Condition::NoPosition(_)
+        | Condition::NoSonar
+        | Condition::TooFast
+        | Condition::CannotSay(PositionDoubt::Cable)
+        | Condition::Over => words.text(),
+    }
 }
 
 /// Number of decimals with which the present speed and the limit read differently.
@@ -173,11 +195,6 @@ fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
         speed_mps > v_max_mps && (hundredths(speed_mps) - hundredths(v_max_mps)).abs() < 0.5
     };
     if speed_mps.zip(v_max_mps).is_some_and(is_over) { 3 } else { 2 }
-}
-
-fn waiting_text(state: &LiveState) -> &'static str {
-    let is_heard = state.heard.iter().any(Option::is_some);
-    if is_heard { "STARTING" } else { "WAITING: nothing from any sensor yet" }
 }
 
 fn age_text(age: DurNs) -> String {
@@ -202,15 +219,6 @@ fn turn_text(what: &str, state: &LiveState) -> String {
     }
 }
 
-fn doubt_text(doubt: PositionDoubt, state: &LiveState) -> String {
-    match doubt {
-        PositionDoubt::Cable => "CAN'T SAY: cable doubtful".to_owned(),
-        PositionDoubt::Spread => {
-            format!("CAN'T SAY: position ±{:.2} m", state.confidence_sd * state.pass_sd_m)
-        }
-    }
-}
-
 /// Share of lost returns, if it limits the speed. In that case the turn's forecast, which assumes no losses,
 /// means little.
 fn losses_text(state: &LiveState) -> Option<String> {
@@ -230,14 +238,14 @@ fn forecast_text(state: &LiveState) -> Option<String> {
 pub fn metres_text(metres: &LiveMetres) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let all = [
-        (fail_m, "missed"),
-        (cannot_say_m, "can't say"),
-        (open_m, "open"),
-        (not_inspected_m, "not inspected"),
+        (fail_m, verdict_words(Verdict::Fail)),
+        (cannot_say_m, verdict_words(Verdict::CannotSay)),
+        (open_m, verdict_words(Verdict::Open)),
+        (not_inspected_m, NOT_INSPECTED),
     ];
     let others = all.into_iter().filter(|(metres_m, _)| *metres_m > 0.0);
     let parts = others.map(|(metres_m, what)| format!("{what} {metres_m:.2} m"));
-    let passed = format!("passed {pass_m:.2} m");
+    let passed = format!("{} {pass_m:.2} m", verdict_words(Verdict::Pass));
     core::iter::once(passed).chain(parts).collect::<Vec<_>>().join(", ")
 }
 

@@ -1,12 +1,13 @@
 //! Texts for the pilot, with figures and units: causes, remedies and advice.
 //!
 //! The terminal, the log for viewers and the summary of a report use them. The words in JSON are the enums'
-//! `as_str`, and the page's labels are in `plugins/dashboard/page/src/text`.
+//! `as_str`; words without figures are in [`words`](super::words).
 
 use super::advice_log::AdviceEntry;
 use super::head_descriptions::HeadDescriptions;
-use super::live_state::LEAST_MPS;
+use super::live_state::{Condition, LEAST_MPS};
 use super::observations::ObservedKind;
+use super::words::{condition_words, limit_words};
 use serde::{Deserialize, Serialize};
 
 use headrace_coverage::{Action, Again, Cause, Causes, Evidence, Run, Sections};
@@ -240,12 +241,8 @@ fn remedy_text(remedy: Option<Remedy>) -> String {
 }
 
 /// Text of the requirement that is missing for a position.
-pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
-    match lacking {
-        NoFix::Heading => "NO POSITION: heading unknown",
-        NoFix::Chainage => "NO POSITION: chainage unknown",
-        NoFix::Section => "NO POSITION: lateral position unknown",
-    }
+pub(super) fn no_position_text(lacking: NoFix) -> String {
+    condition_words(Condition::NoPosition(lacking)).text()
 }
 
 /// Text of the setting that allows a higher speed.
@@ -420,8 +417,10 @@ impl AdviceFigures {
 
 /// Text of advice, with its figures.
 pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadDescriptions) -> String {
+    let no_speed = condition_words(Condition::NoSpeed);
+    let (no_help, limit) = (no_speed.name, limit_words(advice.reason));
     match advice.reason {
-        Reason::HelixPitch if advice.v_max_mps < LEAST_MPS => "no speed meets the target here".to_owned(),
+        Reason::HelixPitch if advice.v_max_mps < LEAST_MPS => no_speed.detail.to_owned(),
         Reason::HelixPitch if advice.will_exceed && advice.speed_mps.abs() > advice.v_max_mps => {
             format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps)
         }
@@ -429,24 +428,23 @@ pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadDescri
             let error_deg = advice.phase_error_rad.to_degrees().abs();
             format!("OUT OF PHASE by {error_deg:.0} degrees: go {:.2} m/s", advice.v_max_mps)
         }
-        Reason::HelixPitch => format!("may go {:.2} m/s (distance between turns)", advice.v_max_mps),
+        Reason::HelixPitch => format!("may go {:.2} m/s ({limit})", advice.v_max_mps),
         Reason::AngularStep => {
             let more_seen =
                 heads.seeing_more().filter(|_| advice.remedy.is_none() && advice.unseen_m.is_some());
             let remedy = more_seen.unwrap_or_else(|| remedy_text(advice.remedy));
             match (advice.remedy, advice.unseen_m) {
-                (Some(Remedy::HoldHeading), _) => format!("slower won't help: {remedy}"),
+                (Some(Remedy::HoldHeading), _) => format!("{no_help}: {remedy}"),
                 (_, Some([width_m, arc_m])) => {
                     let clock = clock_text(profile, arc_m);
-                    format!("slower won't help: no head sees {width_m:.2} m of the wall at {clock}; {remedy}")
+                    format!("{no_help}: no head sees {width_m:.2} m of the wall at {clock}; {remedy}")
                 }
                 (_, None) => {
-                    format!("slower won't help: steps of {:.2} m along the wall; {remedy}", advice.t_y_m)
+                    format!("{no_help}: steps of {:.2} m along the wall; {remedy}", advice.t_y_m)
                 }
             }
         }
-        Reason::NoHeadingOrFix => "no speed can be given: no position or heading".to_owned(),
-        Reason::NoReturns => "no speed can be given: no sonar returns".to_owned(),
+        Reason::NoHeadingOrFix | Reason::NoReturns => format!("no speed can be given: {limit}"),
     }
 }
 

@@ -11,6 +11,7 @@ mod contents;
 mod tls;
 mod undisturbed;
 mod voice;
+mod words;
 
 /// Serves the page on any free port.
 const ANY: &str = "--page=127.0.0.1:0";

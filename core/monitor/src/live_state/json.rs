@@ -216,8 +216,7 @@ impl LiveState {
             state: self.position.as_str(),
             why: match self.position {
                 PositionState::Ok => None,
-                PositionState::Doubtful(super::PositionDoubt::Cable) => Some("cable"),
-                PositionState::Doubtful(super::PositionDoubt::Spread) => Some("spread"),
+                PositionState::Doubtful(doubt) => Some(doubt.as_str()),
                 PositionState::None(lacking) => Some(lacking.as_str()),
             },
             chainage_m: self.chainage_m,

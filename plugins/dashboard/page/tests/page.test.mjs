@@ -45,7 +45,7 @@ describe("display", () => {
   it("shows v_max with its reason, and the wall", () => on({}, async ({ page }) => {
     await condition(page, "good");
     assert.match(await page.locator(".most .value").innerText(), /0\.24/);
-    assert.match(await page.locator(".why").innerText(), /go slower/);
+    assert.match(await page.locator(".why").innerText(), /distance between turns/);
     assert.match(await page.locator(".chainage").innerText(), /^0\+06\d\.\d$/);
     // The stretch from 0+012 to 0+018 was missed: holes over T are yellow, its outline is red, and the rest is blue to grey.
     await page.waitForFunction(() => !document.querySelector(".condition.old"));
@@ -69,7 +69,7 @@ describe("display", () => {
     mock.control({ position: "none" });
     await word(page, "NO POSITION");
     assert.match(await page.locator(".chainage").innerText(), /no position/);
-    assert.match(await page.locator(".sure").innerText(), /no heading/);
+    assert.match(await page.locator(".sure").innerText(), /heading unknown/);
   }));
 
   it("shows a silent sensor within 2 s, with its age", () => on({}, async ({ mock, page }) => {

@@ -61,7 +61,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     const one = await open(chromium, url), other = await open(chromium, url);
     await one.page.locator('.condition[data-condition="good"]').waitFor(LONG);
     assert.match(await one.page.locator(".most .value").innerText(), /0\.\d\d/);
-    assert.match(await one.page.locator(".why").innerText(), /go slower/);
+    assert.match(await one.page.locator(".why").innerText(), /distance between turns/);
     const missed = one.page.locator('.alert.open[data-kind="missed"]');
     await missed.waitFor(LONG);
     const number = await missed.first().getAttribute("data-number");

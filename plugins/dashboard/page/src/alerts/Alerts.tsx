@@ -2,10 +2,11 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { acknowledge, silence } from "../feed/client";
 import type { Alert } from "../feed/types";
-import { isUnacknowledged, PRIORITY_WORDS, sorted } from "../store/alerts";
+import { isUnacknowledged, sorted } from "../store/alerts";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { span } from "../text/format";
+import { PRIORITIES } from "../text/table";
 import { actions } from "../wall/control";
 import { SoundButtons } from "./SoundButtons";
 
@@ -56,7 +57,7 @@ function Item({ alert, may }: { alert: Alert; may: boolean }) {
     <li class={`alert ${alert.priority}${open ? " open" : ""}${rectified ? " rectified" : ""}`} data-number={alert.number} data-state={alert.state} data-kind={alert.kind}>
       <Mark alert={alert} />
       <div class="what">
-        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · rectified" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
+        <div class="line"><b class="priority">{PRIORITIES[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · rectified" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
         <div class="text" title={alert.text}>{alert.text}{alert.count > 1 ? ` (${alert.count} times)` : ""}</div>
         {alert.advice ? <div class="do">→ {alert.advice}</div> : null}
       </div>
@@ -90,7 +91,7 @@ export function AlertAnnouncer() {
   useTopics(store.topics.alerts);
   const newest = sorted(store.alerts.values()).find((alert) => isUnacknowledged(alert) && alert.state === "active");
   const alarm = newest && newest.priority !== "warning";
-  const text = newest ? `${PRIORITY_WORDS[newest.priority]}: ${newest.text}. ${newest.advice ?? ""}` : "";
+  const text = newest ? `${PRIORITIES[newest.priority]}: ${newest.text}. ${newest.advice ?? ""}` : "";
   return (
     <>
       <div class="sr" role="alert">{alarm ? text : ""}</div>

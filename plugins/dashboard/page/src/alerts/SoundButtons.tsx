@@ -1,7 +1,7 @@
 // Buttons that switch sound and speech on and off, and mute classes of alerts.
-import { CLASSES } from "../store/alerts";
 import { prefs, prefsTopic, setPrefs } from "../store/prefs";
 import { useTopics } from "../store/topic";
+import { CLASSES } from "../text/table";
 import { isAudible, soundTopic, unlock } from "./sound";
 
 export function toggleSound(): void {

@@ -1,11 +1,11 @@
 // Types of the feed's messages, with the server's names. Lengths are in metres, times in seconds on the log's clock.
+import type { CLASSES, CONDITIONS, POSITION_WHY, PRIORITIES, REASONS, SENSOR_STATES } from "../text/table";
 
 export type Mode = "live" | "demo" | "replay" | "file";
 export type Lamp = "green" | "amber" | "red";
-export type Condition =
-  | "no_data" | "old" | "no_position" | "outside" | "no_sonar" | "passed" | "going_back" | "no_speed" | "too_fast" | "turn_fails" | "cannot_say" | "over" | "turn_unsure" | "good";
-export type Priority = "emergency_alarm" | "alarm" | "warning" | "caution";
-export type AlertClass = "coverage" | "speed" | "position" | "sensor" | "recording" | "setting";
+export type Condition = keyof typeof CONDITIONS;
+export type Priority = keyof typeof PRIORITIES;
+export type AlertClass = (typeof CLASSES)[number];
 
 export interface Head { id: string; source: number; hidden_deg: [number, number][] }
 
@@ -20,7 +20,7 @@ export interface Hello {
 }
 
 export interface Sensor {
-  id: string; state: "ok" | "silent" | "never" | "stalled" | "deaf" | "hung" | "distrusted"; age_s: number | null; is_head: boolean;
+  id: string; state: keyof typeof SENSOR_STATES; age_s: number | null; is_head: boolean;
 }
 
 export interface Turn {
@@ -32,10 +32,10 @@ export interface State {
   type: "state"; seq?: number; t_s: number; text: string; now_s: number; at_s: number | null; age_s: number | null; old: boolean;
   condition: Condition; lamp: Lamp; recording_fails?: boolean;
   position: {
-    state: "ok" | "doubtful" | "none"; why: string | null; chainage_m: number | null; station: string | null;
+    state: "ok" | "doubtful" | "none"; why: keyof typeof POSITION_WHY | null; chainage_m: number | null; station: string | null;
     chainage_sd_m: number | null; place_sd_m: number | null; yaw_sd_deg: number | null; pass_sd_m: number | null; stand_s: number;
   };
-  speed_mps: number | null; v_max_mps: number | null; reason: string | null; remedy?: string | null;
+  speed_mps: number | null; v_max_mps: number | null; reason: keyof typeof REASONS | null; remedy?: string | null;
   margins: { speed_mps: number | null; turn_m: number | null; position_m: number | null; lost_share: number | null };
   turn: Turn | null;
   sensors: Sensor[];

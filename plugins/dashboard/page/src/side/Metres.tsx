@@ -2,10 +2,11 @@
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure, metres, span, station } from "../text/format";
-import { VERDICTS } from "../text/words";
+import { VERDICTS } from "../text/table";
+import { plain } from "../text/words";
 import { actions } from "../wall/control";
 
-const ORDER = ["pass_m", "fail_m", "cannot_say_m", "not_inspected_m", "open_m"] as const;
+const ORDER = ["pass", "fail", "cannot_say", "not_inspected", "open"] as const;
 
 export function Metres() {
   useTopics(store.topics.state);
@@ -20,15 +21,15 @@ export function Metres() {
           <pattern id="unsure" width="10" height="10" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="10" height="10" class="v-cannot-say" /><rect width="4" height="10" class="v-stripe" /></pattern>
         </defs>
         {ORDER.map((key) => {
-          const share = ((all?.[key] ?? 0) / whole) * 1000, x = at;
+          const share = ((all?.[`${key}_m`] ?? 0) / whole) * 1000, x = at;
           at += share;
-          return <rect key={key} x={x} y="0" width={Math.max(share > 0 ? 4 : 0, share)} height="20" class={`v-${key.replace(/_m$/, "").replaceAll("_", "-")}`} fill={key === "cannot_say_m" ? "url(#unsure)" : undefined} />;
+          return <rect key={key} x={x} y="0" width={Math.max(share > 0 ? 4 : 0, share)} height="20" class={`v-${key.replaceAll("_", "-")}`} fill={key === "cannot_say" ? "url(#unsure)" : undefined} />;
         })}
       </svg>
       <dl>
         {ORDER.map((key) => (
-          <div key={key} class={key === "fail_m" && (all?.fail_m ?? 0) > 0 ? "bad" : ""}>
-            <dt><i class={`key v-${key.replace(/_m$/, "").replaceAll("_", "-")}`} />{VERDICTS[key]}</dt><dd>{all ? metres(all[key]) : "–"}</dd>
+          <div key={key} class={key === "fail" && (all?.fail_m ?? 0) > 0 ? "bad" : ""}>
+            <dt><i class={`key v-${key.replaceAll("_", "-")}`} />{VERDICTS[key]}</dt><dd>{all ? metres(all[`${key}_m`]) : "–"}</dd>
           </div>
         ))}
       </dl>
@@ -45,7 +46,7 @@ function Compared() {
   return (
     <p class="compared">
       <b>T {figure(other.target_m, 2)} m:</b>{" "}
-      {(["pass_m", "fail_m", "cannot_say_m", "open_m"] as const).map((key) => `${VERDICTS[key]} ${metres(other[key])}`).join(" · ")}
+      {(["pass", "fail", "cannot_say", "open"] as const).map((key) => `${VERDICTS[key]} ${metres(other[`${key}_m`])}`).join(" · ")}
     </p>
   );
 }
@@ -73,7 +74,7 @@ export function Back() {
           {legs.map((leg) => (
             <li key={`${leg.from_m}-${leg.to_m}`}>
               <button type="button" class="leg" onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>
-                <b>{station(leg.from_m)}–{station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` ≤ ${figure(leg.at_most_mps, 2)} m/s`}<span class="leg-why"> {leg.why.replaceAll("_", " ")}</span>
+                <b>{station(leg.from_m)}–{station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` ≤ ${figure(leg.at_most_mps, 2)} m/s`}<span class="leg-why"> {plain(leg.why)}</span>
               </button>
             </li>
           ))}

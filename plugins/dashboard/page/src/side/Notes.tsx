@@ -5,6 +5,7 @@ import { store } from "../store/store";
 import type { Note } from "../feed/types";
 import { useTopics } from "../store/topic";
 import { clock, station } from "../text/format";
+import { NOTES } from "../text/table";
 import { playTopic, playing, togglePlay } from "../voice/play";
 import { VoiceButton, VoiceWords } from "../voice/Voice";
 import { actions } from "../wall/control";
@@ -19,8 +20,8 @@ export function openNote(): void {
 
 /** Text of a note, the same as on the terminal. */
 export function words({ text, voice }: Note): string {
-  if (voice) return voice.seconds === null ? "voice" : `voice, ${voice.seconds} s`;
-  return text || "mark";
+  if (voice) return voice.seconds === null ? NOTES.voice : `${NOTES.voice}, ${voice.seconds} s`;
+  return text || NOTES.mark;
 }
 
 export function Notes() {

@@ -4,7 +4,7 @@ import type { Sensor } from "../feed/types";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure, span } from "../text/format";
-import { SENSOR_STATES } from "../text/words";
+import { SENSOR_STATES } from "../text/table";
 import { Shape } from "../ui/Shape";
 
 export function Sensors() {
@@ -22,7 +22,7 @@ export function Sensors() {
           const lamp = is === "ok" ? "green" : is === "unknown" ? "none" : is === "stalled" || is === "distrusted" ? "amber" : "red";
           const hz = state?.rates?.find((rate) => rate.id === sensor.id)?.hz;
           const kind = hello?.sensors.find((each) => each.id === sensor.id)?.kind ?? "";
-          const word = SENSOR_STATES[is] ?? is;
+          const word = is === "unknown" ? is : (SENSOR_STATES[is] ?? is);
           return (
             <li key={sensor.id} class={`sensor ${lamp}`} data-sensor={sensor.id} data-state={is} title={kind}>
               <Shape lamp={lamp} size={18} />

@@ -4,7 +4,8 @@ import { shown, age_s, isOld } from "../store/age";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure, span, station } from "../text/format";
-import { POSITION_WHY, REASONS } from "../text/words";
+import { REASONS } from "../text/table";
+import { positionWhy } from "../text/words";
 import { Shape } from "../ui/Shape";
 import { marks, scaleEnd, TOO_FAST } from "./gauge";
 
@@ -108,7 +109,7 @@ export function Place() {
     <div class="place">
       <div class={`chainage${dead ? " dead" : ""}`}>{dead ? "no position" : station(position.chainage_m ?? 0, 1)}</div>
       <div class="sure">
-        {dead ? (POSITION_WHY[position?.why ?? ""] ?? "") : <>± {figure(position.chainage_sd_m === null ? null : 2 * position.chainage_sd_m, 2)} m (95 %){position.state === "doubtful" ? <b class="doubt"> doubtful: {POSITION_WHY[position.why ?? ""] ?? ""}</b> : null}</>}
+        {dead ? positionWhy(position?.why) : <>± {figure(position.chainage_sd_m === null ? null : 2 * position.chainage_sd_m, 2)} m (95 %){position.state === "doubtful" ? <b class="doubt"> doubtful: {positionWhy(position.why)}</b> : null}</>}
       </div>
       <div class={`age${isOld(store) ? " old" : ""}`}>{store.link.phase === "file" ? "from a file" : `data ${age === null ? "–" : span(age)} old`}</div>
     </div>

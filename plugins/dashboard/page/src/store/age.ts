@@ -1,6 +1,7 @@
 // Age of the displayed data, and text about the age.
-import { conditionWords, type Shown } from "../text/words";
 import { span } from "../text/format";
+import { CONDITIONS } from "../text/table";
+import { conditionWords, oldWords, type Shown } from "../text/words";
 import type { Store } from "./store";
 
 /** Data older than this is displayed as old, as in the loop. */
@@ -48,7 +49,7 @@ export function shown(store: Store): Shown {
   if (link.phase === "refused") return { word: "NO ACCESS", advice: "a token is needed", lamp: "amber", old: true };
   if (!state) {
     const advice = link.phase === "open" ? "for the dive's state" : `for the program, ${span(lost ?? 0)}`;
-    return { word: "WAITING", advice, lamp: "amber", old: true };
+    return { word: CONDITIONS.no_data.name, advice, lamp: "amber", old: true };
   }
   const gone = sinceState_s(store);
   if (hasEnded(store)) {
@@ -60,7 +61,7 @@ export function shown(store: Store): Shown {
   }
   if (isOld(store)) {
     const age = age_s(store) ?? gone;
-    return { word: `OLD ${span(age)}`, advice: "nothing from any sensor: stop", lamp: "red", old: true };
+    return { ...oldWords(age), lamp: "red", old: true };
   }
   return { ...conditionWords(state), lamp: state.lamp, old: false };
 }

@@ -1,5 +1,5 @@
-// Order and kinds of alerts, as IMO MSC.302(87) defines them.
-import type { Alert, Priority } from "../feed/types";
+// Order of alerts, as IMO MSC.302(87) defines them.
+import type { Alert } from "../feed/types";
 
 export const isUnacknowledged = (alert: Alert): boolean => alert.needs_acknowledgement && alert.acknowledged === null;
 
@@ -18,8 +18,3 @@ export function sorted(alerts: Iterable<Alert>): Alert[] {
   const shown = [...alerts].filter((alert) => alert.state !== "cleared");
   return shown.sort((a, b) => rank(a) - rank(b) || b.since_s - a.since_s || b.number - a.number);
 }
-
-export const PRIORITY_WORDS: Record<Priority, string> = {
-  emergency_alarm: "EMERGENCY", alarm: "ALARM", warning: "WARNING", caution: "CAUTION",
-};
-export const CLASSES = ["coverage", "speed", "position", "sensor", "recording", "setting"] as const;

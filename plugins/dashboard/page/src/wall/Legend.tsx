@@ -2,6 +2,7 @@
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure } from "../text/format";
+import { UNSEEN, VERDICTS } from "../text/table";
 
 export function Legend() {
   useTopics(store.topics.hello);
@@ -11,9 +12,9 @@ export function Legend() {
     <span class="legend">
       <span class="scale" aria-hidden="true" />
       <span>hole 0 · <b>T {compared === undefined ? `${figure(target, 2)} m` : `${figure(target, 2)} or ${figure(compared, 2)} m`}</b> · 2 T</span>
-      <span class="mark flagged">missed</span>
-      <span class="mark hatched">can't say</span>
-      <span class="mark blank">unseen</span>
+      <span class="mark flagged">{VERDICTS.fail}</span>
+      <span class="mark hatched">{VERDICTS.cannot_say}</span>
+      <span class="mark blank">{UNSEEN}</span>
     </span>
   );
 }

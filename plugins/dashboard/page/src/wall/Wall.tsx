@@ -4,6 +4,8 @@ import { samples as fetchSamples } from "../feed/client";
 import { prefsTopic } from "../store/prefs";
 import { store } from "../store/store";
 import { figure, station } from "../text/format";
+import { VERDICTS } from "../text/table";
+import { plain } from "../text/words";
 import { fit, useSize, type Size } from "../ui/canvas";
 import { colour } from "../ui/colours";
 import { actions, current, vehicle, viewTopic, wayOf, whole } from "./control";
@@ -18,6 +20,8 @@ import { left_m, right_m, roundOf, wholeView, type Round, type View } from "./vi
 const LEFT = 30, TOP = 8, BOTTOM = 24, STRIP = 34, STRIP_BOTTOM = 18;
 /** Gap between two walls, pixels. */
 const BETWEEN = 16;
+/** Verdicts by their number in the feed. */
+const NUMBERED = [VERDICTS.open, VERDICTS.pass, VERDICTS.fail, VERDICTS.cannot_say, VERDICTS.not_inspected];
 /** Minimum radius of a disc in pixels, and widest view in which discs are drawn. */
 const LEAST_RADIUS = 2.2, DISCS_UPTO_M = 160;
 
@@ -168,10 +172,10 @@ class Painter {
     if (slot < 0) return station(x_m, 1);
     const row = this.rows(hello.target_m, hello.compared_m).find((each) => y <= each.top + each.height);
     const held = row?.held ?? "own", target_m = row?.target_m ?? hello.target_m;
-    const verdict = ["open", "pass", "missed", "can't say", "not inspected"][sections.verdictOf(slot, held)] ?? "";
+    const verdict = NUMBERED[sections.verdictOf(slot, held)] ?? "";
     // Causes and reasons are known only for the dive's own target.
     const own = held === "own" ? slot : -1, cause = hello.causes[sections.cause[own] ?? 255], why = hello.whys[sections.why[own] ?? 255];
-    const words = [cause, why].filter((word) => word !== undefined).map((word) => word.replaceAll("_", " ")).join(", ");
+    const words = [cause, why].filter((word) => word !== undefined).map(plain).join(", ");
     const d = sections.hole[slot] ?? NaN;
     return `${station(x_m, 1)}: ${verdict}${words ? ` (${words})` : ""}${Number.isFinite(d) ? `, hole ${figure(d, 2)} m (limit ${figure(target_m, 2)})` : ""}`;
   }

@@ -1,0 +1,131 @@
+//! The table of words for codes: conditions, positions, reasons, verdicts, sensors and priorities.
+//!
+//! The lines, the terminal and the page use these words. [`typescript`] makes the page's copy. Texts with
+//! figures are in [`pilot_text`](super::pilot_text).
+
+pub mod typescript;
+
+use super::alert_list::Priority;
+use super::live_state::{Condition, PositionDoubt, SensorState};
+use headrace_coverage::Verdict;
+use headrace_fusion::NoFix;
+use headrace_sampling::advice::Reason;
+
+/// Name of the condition if sensors deliver data, but no update has come yet.
+pub const STARTING: &str = "STARTING";
+/// Action for finding the gyros' bias. The number of seconds follows.
+pub const STAND_STILL: &str = "stand still";
+/// State of a section that not all heads have passed.
+pub const NOT_INSPECTED: &str = "not inspected";
+/// State of wall without any data.
+pub const UNSEEN: &str = "unseen";
+
+/// Words for a condition, without figures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConditionWords {
+    /// Name.
+    pub name: &'static str,
+    /// Explanation; empty if the name explains itself.
+    pub detail: &'static str,
+    /// Action; empty if there is none, or if it is a speed.
+    pub action: &'static str,
+    /// Words before v_max; empty if v_max isn't stated.
+    pub speed: &'static str,
+}
+
+impl ConditionWords {
+    /// Name and explanation.
+    pub fn text(&self) -> String {
+        let Self { name, detail, .. } = self;
+        if detail.is_empty() { (*name).to_owned() } else { format!("{name}: {detail}") }
+    }
+
+    /// Action; empty if there is none. `v_max` is v_max with its unit.
+    pub fn action_text(&self, v_max: &str) -> String {
+        let Self { action, speed, .. } = self;
+        if speed.is_empty() { (*action).to_owned() } else { format!("{speed} {v_max}") }
+    }
+}
+
+/// Words for a condition.
+pub fn condition_words(condition: Condition) -> ConditionWords {
+    let [name, detail, action, speed] = match condition {
+        Condition::NoData => ["WAITING", "nothing from any sensor yet", "", ""],
+        Condition::Old(_) => ["OLD", "nothing from any sensor", "stop", ""],
+        Condition::NoPosition(lacking) => ["NO POSITION", missing_words(lacking), "hold still", ""],
+        Condition::Outside(_) => ["OUTSIDE", "no head is within the tunnel", "", ""],
+        Condition::NoSonar => ["NO SONAR", "no returns", "stop", ""],
+        Condition::Passed => ["passed here", "any speed will do", "", ""],
+        Condition::GoingBack(_) => ["going back", "to a missed section: any speed will do", "", ""],
+        Condition::NoSpeed => ["slower won't help", "no speed meets the target here", "", ""],
+        Condition::TooFast => ["TOO FAST", "", "", "at most"],
+        // Heads that are apart along the hull and turn out of phase can miss wall below v_max. Going slower
+        // would then make it worse, so the action is v_max itself.
+        Condition::TurnFails => ["THIS TURN MISSES", "", "", "go"],
+        Condition::CannotSay(doubt) => ["CAN'T SAY", doubt_words(doubt), "", "at most"],
+        Condition::Over => ["a little fast", "", "", "at most"],
+        Condition::TurnUnsure => ["THIS TURN MAY MISS", "", "", "go"],
+        Condition::Good => ["good", "", "", "may go up to"],
+    };
+    ConditionWords { name, detail, action, speed }
+}
+
+/// Words for the requirement that is missing for a position.
+pub fn missing_words(lacking: NoFix) -> &'static str {
+    match lacking {
+        NoFix::Heading => "heading unknown",
+        NoFix::Chainage => "chainage unknown",
+        NoFix::Section => "lateral position unknown",
+    }
+}
+
+/// Words for the reason for which a position is doubtful.
+pub fn doubt_words(doubt: PositionDoubt) -> &'static str {
+    match doubt {
+        PositionDoubt::Cable => "cable doubtful",
+        PositionDoubt::Spread => "position drifts between passes",
+    }
+}
+
+/// Words for the factor that limits the speed.
+pub fn limit_words(reason: Reason) -> &'static str {
+    match reason {
+        Reason::HelixPitch => "distance between turns",
+        Reason::AngularStep => "samples too far apart along the wall: slower won't help",
+        Reason::NoHeadingOrFix => "no position or heading",
+        Reason::NoReturns => "no sonar returns",
+    }
+}
+
+/// Words for a verdict.
+pub fn verdict_words(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Open => "open",
+        Verdict::Pass => "passed",
+        Verdict::Fail => "missed",
+        Verdict::CannotSay => "can't say",
+    }
+}
+
+/// Words for the state of a sensor.
+pub fn sensor_words(state: SensorState) -> &'static str {
+    match state {
+        SensorState::Never => "no data yet",
+        SensorState::Silent => "silent",
+        SensorState::Stalled => "doesn't turn",
+        SensorState::Deaf => "detects no wall",
+        SensorState::Hung => "stuck",
+        SensorState::Distrusted => "not trusted",
+        SensorState::Ok => "ok",
+    }
+}
+
+/// Word for a priority.
+pub fn priority_word(priority: Priority) -> &'static str {
+    match priority {
+        Priority::EmergencyAlarm => "EMERGENCY",
+        Priority::Alarm => "ALARM",
+        Priority::Warning => "WARNING",
+        Priority::Caution => "CAUTION",
+    }
+}
