@@ -22,6 +22,8 @@ use headrace_dashboard::collector::Collector;
 use headrace_dashboard::{HeadSite, Mode, Page, SensorSite, Settings, Site, Voices};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
+use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
+use headrace_monitor::messages::Notice;
 use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
 use headrace_sensor::device::{Direction, Sense};
@@ -176,22 +178,26 @@ fn dive(scene: &Scene, messages: &[Kept], seconds: u64, beside: Beside) -> Measu
     let has_page = matches!(beside, Beside::Page | Beside::Viewers);
     let (mut armed, notices) = armed(scene, has_page);
     let page = has_page.then(|| serve(scene));
-    let mut collector = page.as_ref().map(|page| page.collector(&armed, false));
+    let mut follower = page.as_ref().map(|page| Follower {
+        collector: page.collector(&armed, false),
+        teller: LiveMessages::default(),
+        told: Vec::new(),
+    });
     let is_over = Arc::new(AtomicBool::new(false));
     let viewers = page.as_ref().filter(|_| beside == Beside::Viewers);
     let viewers = viewers.map(|page| Viewers::connect(page, &is_over));
     if beside == Beside::BusyThreads {
         be_busy(&is_over);
     }
-    let mut measured = run(&mut armed, messages, seconds, |dive| follow(collector.as_mut(), &notices, dive));
+    let mut measured = run(&mut armed, messages, seconds, |dive| follow(follower.as_mut(), &notices, dive));
     let counts = page.as_ref().map(counts);
     armed.finish(&mut |notice, dive| {
-        if let Some(collector) = &mut collector {
-            collector.notice(notice, dive);
+        if let Some(follower) = &mut follower {
+            follower.notice(notice, dive);
         }
     });
-    if let Some(collector) = &mut collector {
-        collector.end(&armed);
+    if let Some(follower) = &mut follower {
+        follower.end(&armed);
     }
     is_over.store(true, Ordering::Relaxed);
     if let Some(page) = page {
@@ -250,15 +256,47 @@ fn run(dive: &mut Loop, messages: &[Kept], seconds: u64, mut beside: impl FnMut(
     Measured { ticks, collecting, ends, samples: 0, digest: 0, notices_dropped: 0, page: String::new() }
 }
 
+/// The page's follower, as in the program.
+struct Follower {
+    collector: Collector,
+    teller: LiveMessages,
+    told: Vec<LiveMessage>,
+}
+
+impl Follower {
+    fn notice(&mut self, notice: &Notice, dive: &Loop) {
+        self.teller.hear(notice, dive, &mut |one| self.told.push(one));
+        self.pass_on(dive);
+        self.collector.notice(notice);
+    }
+
+    fn tick(&mut self, dive: &Loop) {
+        self.teller.tick(dive.view().live_state(), dive, &mut |one| self.told.push(one));
+        self.pass_on(dive);
+        self.collector.tick(dive);
+    }
+
+    fn end(&mut self, dive: &Loop) {
+        self.teller.end(&dive.view().coverage().sections, &mut |one| self.told.push(one));
+        self.pass_on(dive);
+        self.collector.end(dive);
+    }
+
+    fn pass_on(&mut self, dive: &Loop) {
+        self.collector.messages(&self.told, dive);
+        self.told.clear();
+    }
+}
+
 /// Work of the program after each tick. Without a page, this work only takes the notices.
-fn follow(mut collector: Option<&mut Collector>, notices: &NoticeReceiver, dive: &Loop) {
+fn follow(mut follower: Option<&mut Follower>, notices: &NoticeReceiver, dive: &Loop) {
     while let Some(notice) = notices.next() {
-        if let Some(collector) = &mut collector {
-            collector.notice(&notice, dive);
+        if let Some(follower) = &mut follower {
+            follower.notice(&notice, dive);
         }
     }
-    if let Some(collector) = collector {
-        collector.tick(dive);
+    if let Some(follower) = follower {
+        follower.tick(dive);
     }
 }
 

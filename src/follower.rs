@@ -1,6 +1,7 @@
 //! Interface of followers of a dive besides the terminal, such as a page or another program.
 
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::messages::Notice;
 use headrace_monitor::run::Loop;
 use headrace_ports::Status;
@@ -13,6 +14,9 @@ use crate::recording_state::RecordingState;
 /// A follower takes values from the loop and hands them to a thread of its own. In a live dive a follower
 /// never waits; a replay may wait for its followers.
 pub(crate) trait Follower {
+    /// Called before [`notice`](Self::notice), [`tick`](Self::tick) and [`end`](Self::end), with the live
+    /// messages that follow from the result, from the tick, and from the end of the dive.
+    fn messages(&mut self, _told: &[LiveMessage], _dive: &Loop) {}
     /// Called for each result of the last tick.
     fn notice(&mut self, _notice: &Notice, _dive: &Loop) {}
     /// Called after every tick, even without packets.

@@ -22,6 +22,7 @@ use headrace_dashboard::{
 };
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::console::{Command as Input, ConsolePort, NoteText, Who};
+use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
@@ -406,8 +407,12 @@ struct PageFollower {
 }
 
 impl Follower for PageFollower {
-    fn notice(&mut self, notice: &Notice, dive: &Loop) {
-        self.collector.notice(notice, dive);
+    fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
+        self.collector.messages(told, dive);
+    }
+
+    fn notice(&mut self, notice: &Notice, _: &Loop) {
+        self.collector.notice(notice);
     }
 
     fn tick(&mut self, dive: &Loop) {

@@ -46,6 +46,7 @@ pub(crate) struct Watch {
     show: Show,
     screen: Screen,
     printer: Option<Printer>,
+    /// Source of the live messages, for the lines and all followers.
     teller: LiveMessages,
     /// Time and condition of the last state shown.
     shown: Option<(MonoNs, Condition)>,
@@ -106,29 +107,38 @@ impl Watch {
 
     /// Shows a result of the loop.
     pub(crate) fn notice(&mut self, notice: &Notice, dive: &Loop) {
-        self.followers.iter_mut().for_each(|follower| follower.notice(notice, dive));
-        if self.printer.is_none() {
+        if !self.has_readers() {
             return;
+        }
+        let mut told = Vec::new();
+        self.teller.hear(notice, dive, &mut |one| told.push(one));
+        for follower in &mut self.followers {
+            follower.messages(&told, dive);
+            follower.notice(notice, dive);
         }
         let at = match notice {
             Notice::Section { at, .. } | Notice::Run { at, .. } | Notice::Listed { at, .. } => *at,
             Notice::Advice(entry) => entry.at,
             Notice::Note(note) => note.at,
         };
-        let mut told = Vec::new();
-        self.teller.hear(notice, dive, &mut |one| told.push(one));
         self.tell(at, &told, dive);
     }
 
     /// Shows the state. Called after every tick, even without packets.
     pub(crate) fn tick(&mut self, dive: &Loop) {
-        self.followers.iter_mut().for_each(|follower| follower.tick(dive));
-        if self.printer.is_none() {
+        if !self.has_readers() {
             return;
         }
         let state = dive.view().live_state();
         let mut told = Vec::new();
         self.teller.tick(state, dive, &mut |one| told.push(one));
+        for follower in &mut self.followers {
+            follower.messages(&told, dive);
+            follower.tick(dive);
+        }
+        if self.printer.is_none() {
+            return;
+        }
         self.tell(state.now, &told, dive);
         let condition = state.condition();
         if self.is_due(state, condition) {
@@ -195,7 +205,7 @@ impl Watch {
     /// Shows that a replay has paused, jumped or ended at `time` after its beginning.
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
         self.shown = None;
-        self.teller.forget();
+        self.teller.stopped(dive.now());
         self.followers.iter_mut().for_each(|follower| follower.stopped(dive, time, ended));
         let (tick, samples, digest) =
             (dive.ticks(), dive.view().tally().samples, format!("{:016x}", dive.view().digest()));
@@ -220,15 +230,21 @@ impl Watch {
 
     /// Ends the output of a dive.
     pub(crate) fn end(&mut self, dive: &Loop) {
-        self.followers.iter_mut().for_each(|follower| follower.end(dive));
-        if self.printer.is_some() {
-            let mut told = Vec::new();
-            self.teller.end(&dive.view().coverage().sections, &mut |one| told.push(one));
-            self.tell(dive.now(), &told, dive);
+        let mut told = Vec::new();
+        self.teller.end(&dive.view().coverage().sections, &mut |one| told.push(one));
+        for follower in &mut self.followers {
+            follower.messages(&told, dive);
+            follower.end(dive);
         }
+        self.tell(dive.now(), &told, dive);
         if let Some(printer) = &mut self.printer {
             printer.end();
         }
+    }
+
+    /// Whether a line or a follower shows messages.
+    fn has_readers(&self) -> bool {
+        self.printer.is_some() || !self.followers.is_empty()
     }
 
     fn is_due(&self, state: &LiveState, condition: Condition) -> bool {
@@ -274,7 +290,11 @@ impl Watch {
         }
     }
 
+    /// Writes messages, if there are lines.
     fn tell(&mut self, at: MonoNs, told: &[LiveMessage], dive: &Loop) {
+        if self.printer.is_none() {
+            return;
+        }
         for one in told {
             let line = message_line(one, &dive.mission().profile, dive.head_descriptions());
             if self.show == Show::Lines {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::head_descriptions::HeadDescriptions;
-use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
+use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::live_state::{Condition, LiveState, SensorState};
 use headrace_monitor::live_text::{PilotLine, message_line, status_line};
 use headrace_monitor::messages::Notice;
@@ -63,7 +63,6 @@ pub(super) struct SensorRow {
 /// State kept between frames.
 pub(super) struct FrameBuilder {
     vehicle: String,
-    teller: LiveMessages,
     told: VecDeque<PilotLine>,
     /// Sections that have changed since the last frame; `None` if all have to be shown.
     changed: Option<BTreeSet<i64>>,
@@ -78,7 +77,6 @@ impl FrameBuilder {
     pub(super) fn new(vehicle: &str) -> Self {
         Self {
             vehicle: vehicle.to_owned(),
-            teller: LiveMessages::default(),
             told: VecDeque::new(),
             changed: None,
             clock: None,
@@ -96,23 +94,16 @@ impl FrameBuilder {
         self.told.push_back(line);
     }
 
-    pub(super) fn hear(&mut self, notice: &Notice, dive: &Loop) {
+    pub(super) fn hear(&mut self, notice: &Notice) {
         if let (Notice::Section { section, .. }, Some(changed)) = (notice, &mut self.changed) {
             changed.insert(*section);
         }
-        let mut told = Vec::new();
-        self.teller.hear(notice, dive, &mut |one| tell(&one, dive, &mut told));
-        for line in told {
-            self.tell(line);
-        }
     }
 
-    pub(super) fn tick(&mut self, dive: &Loop) {
-        let mut told = Vec::new();
-        let state = dive.view().live_state();
-        self.teller.tick(state, dive, &mut |one| tell(&one, dive, &mut told));
-        for line in told {
-            self.tell(line);
+    /// Adds the lines of live messages that add something to the list of alerts.
+    pub(super) fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
+        for one in told.iter().filter(|one| one.adds_line()) {
+            self.tell(message_line(one, &dive.mission().profile, dive.head_descriptions()));
         }
     }
 
@@ -134,7 +125,6 @@ impl FrameBuilder {
 
     /// Resets the state after a jump of the playback.
     pub(super) fn forget(&mut self) {
-        self.teller.forget();
         self.changed = None;
         self.counted = [None, None];
     }
@@ -227,11 +217,4 @@ fn reason_text(
         return format!("the {} limits the speed", limit_words(advice.reason));
     }
     advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile, heads)
-}
-
-/// Adds a message's line to `to`, if the line adds something to the list of alerts.
-fn tell(one: &LiveMessage, dive: &Loop, to: &mut Vec<PilotLine>) {
-    if one.adds_line() {
-        to.push(message_line(one, &dive.mission().profile, dive.head_descriptions()));
-    }
 }

@@ -24,6 +24,7 @@ use std::time::Duration;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::console::ConsolePort;
+use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::live_state::Lamp;
 use headrace_monitor::live_text::PilotLine;
 use headrace_monitor::messages::Notice;
@@ -124,12 +125,15 @@ impl Tui {
 }
 
 impl Follower for Tui {
-    fn notice(&mut self, notice: &Notice, dive: &Loop) {
-        self.eye.hear(notice, dive);
+    fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
+        self.eye.messages(told, dive);
+    }
+
+    fn notice(&mut self, notice: &Notice, _: &Loop) {
+        self.eye.hear(notice);
     }
 
     fn tick(&mut self, dive: &Loop) {
-        self.eye.tick(dive);
         if self.wanted.swap(false, Ordering::Relaxed) {
             self.show(dive, None);
         }

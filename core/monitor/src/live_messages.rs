@@ -91,6 +91,8 @@ pub enum LiveMessage {
 }
 
 /// Converts the loop's notices to live messages.
+///
+/// A dive has one of these, and all its readers share the messages.
 #[derive(Debug, Default)]
 pub struct LiveMessages {
     /// Last flagged run with its reported causes, until its end is reported.
@@ -108,6 +110,8 @@ pub struct LiveMessages {
     /// Last reported doubtful setting, and the number of its alert.
     setting: Option<(u32, SettingDoubt)>,
     way_told: Option<MonoNs>,
+    /// End of the last tick whose messages were reported.
+    played: Option<MonoNs>,
 }
 
 /// Sections reported as missed: from the first one that ever failed to the one after the last.
@@ -125,9 +129,13 @@ impl ReportedMiss {
 }
 
 impl LiveMessages {
-    /// Resets all state after a jump of the playback.
-    pub fn forget(&mut self) {
-        *self = Self::default();
+    /// Resets all state if the playback has stopped at another time than that of the last tick, after a jump.
+    ///
+    /// After a mere pause, the messages continue.
+    pub fn stopped(&mut self, now: MonoNs) {
+        if self.played != Some(now) {
+            *self = Self::default();
+        }
     }
 
     /// Processes a notice, and calls `tell` with the messages that follow from it.
@@ -152,6 +160,7 @@ impl LiveMessages {
 
     /// Reports whatever the live state requires, after every tick.
     pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
+        self.played = Some(dive.now());
         let Some(at) = state.at else { return };
         self.tell_other_setting(at, dive, tell);
         let sections = &dive.view().coverage().sections;
@@ -392,4 +401,20 @@ fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) ->
 
 fn bounds_m(run: &Run, sections: &Sections) -> (f64, f64) {
     (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pause_keeps_reported_stretches_and_jump_drops_them() {
+        let missed = ReportedMiss { run: RunId(1), from: 0, to: 4 };
+        let mut messages =
+            LiveMessages { missed: vec![missed], played: Some(MonoNs(5)), ..LiveMessages::default() };
+        messages.stopped(MonoNs(5));
+        assert_eq!(messages.missed.len(), 1);
+        messages.stopped(MonoNs(4));
+        assert!(messages.missed.is_empty());
+    }
 }

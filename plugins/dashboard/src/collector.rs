@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use headrace_geometry::frames::{Mount, Point3, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::alert_list::NoteJson;
-use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
+use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::live_text::{message_line, status_line};
 use headrace_monitor::messages::{Notice, Outcome as Placing};
 use headrace_monitor::report::go_back;
@@ -68,7 +68,6 @@ pub struct Collector {
     /// Whether the collector waits for room in the queue. A replay waits, a live dive does not.
     waits: bool,
     is_playback: bool,
-    teller: LiveMessages,
     sensors: Vec<Followed>,
     rates_from: Option<MonoNs>,
     begun: Option<MonoNs>,
@@ -113,7 +112,6 @@ impl Collector {
             to,
             waits,
             is_playback,
-            teller: LiveMessages::default(),
             sensors: dive.sources().iter().zip(dive.sensors()).map(followed).collect(),
             rates_from: None,
             begun: None,
@@ -144,8 +142,22 @@ impl Collector {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
+    /// Collects the live messages of a notice, a tick or the end. Call it before the method for that.
+    pub fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
+        for one in told {
+            let mut value =
+                serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
+            if let Some(object) = value.as_object_mut() {
+                let line = message_line(one, &dive.mission().profile, dive.head_descriptions());
+                object.insert("t_s".to_owned(), dive.now().as_secs_f64().into());
+                object.entry("text").or_insert_with(|| line.text().into());
+            }
+            self.push_told(value);
+        }
+    }
+
     /// Collects one notice of the last tick.
-    pub fn notice(&mut self, notice: &Notice, dive: &Loop) {
+    pub fn notice(&mut self, notice: &Notice) {
         match notice {
             Notice::Section { section, .. } => {
                 self.changed.insert(*section);
@@ -154,17 +166,11 @@ impl Collector {
             Notice::Note(_) => self.notes_due = true,
             Notice::Advice(_) | Notice::Listed { .. } => {}
         }
-        let mut told = Vec::new();
-        self.teller.hear(notice, dive, &mut |one| told.push(one));
-        self.tell(&told, dive);
     }
 
     /// Collects the results of the last tick, and sends what is due.
     pub fn tick(&mut self, dive: &Loop) {
         self.gather(dive);
-        let mut told = Vec::new();
-        self.teller.tick(dive.view().live_state(), dive, &mut |one| told.push(one));
-        self.tell(&told, dive);
         let now = dive.now();
         self.played = Some(now);
         let is_due = self.sent.is_none_or(|sent| now.since(sent).0.abs() >= EVERY.0);
@@ -216,7 +222,6 @@ impl Collector {
             self.send(dive);
             return;
         }
-        self.teller.forget();
         let now = dive.now();
         (self.sent, self.rates_from, self.back_told) = (None, None, None);
         (self.back_due, self.notes_due) = (true, true);
@@ -234,9 +239,6 @@ impl Collector {
 
     /// Sends the end of the dive. Call it when all sections are judged.
     pub fn end(&mut self, dive: &Loop) {
-        let mut told = Vec::new();
-        self.teller.end(&dive.view().coverage().sections, &mut |one| told.push(one));
-        self.tell(&told, dive);
         self.change_all(dive);
         if let Some(compared) = &mut self.compared {
             compared.forget();
@@ -327,19 +329,6 @@ impl Collector {
         let x_m = f64::from(sample.x_m);
         let [from_m, to_m] = self.lacking_m.unwrap_or([x_m; 2]);
         self.lacking_m = Some([from_m.min(x_m), to_m.max(x_m)]);
-    }
-
-    fn tell(&mut self, told: &[LiveMessage], dive: &Loop) {
-        for one in told {
-            let mut value =
-                serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
-            if let Some(object) = value.as_object_mut() {
-                let line = message_line(one, &dive.mission().profile, dive.head_descriptions());
-                object.insert("t_s".to_owned(), dive.now().as_secs_f64().into());
-                object.entry("text").or_insert_with(|| line.text().into());
-            }
-            self.push_told(value);
-        }
     }
 
     fn push_told(&mut self, value: Value) {
