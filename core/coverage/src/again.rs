@@ -71,9 +71,17 @@ impl Tally {
     /// Returns true if the section may have been the only one with the lowest speed. The caller must then find the
     /// lowest speed again.
     pub(super) fn remove(&mut self, section: &Failing) -> bool {
+        let is_counted =
+            self.mended >= section.is_mended().into() && self.beyond >= section.is_beyond().into();
+        debug_assert!(is_counted, "a removed section was counted: {section:?} in {self:?}");
         self.mended = self.mended.saturating_sub(u32::from(section.is_mended()));
         self.beyond = self.beyond.saturating_sub(u32::from(section.is_beyond()));
         section.is_mended() && section.again_mps <= self.least_mps
+    }
+
+    /// Whether the counts are possible for this number of failed sections.
+    pub(super) fn is_of(&self, failed: u32) -> bool {
+        self.mended.checked_add(self.beyond).is_some_and(|counted| counted <= failed)
     }
 
     /// Whether the section's speed is the lowest of the counted speeds.

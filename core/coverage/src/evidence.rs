@@ -53,6 +53,15 @@ pub struct Evidence {
 }
 
 impl Evidence {
+    /// Whether causes and figures agree: the main cause is a cause, shares are from 0 to 1, and losses allow no speed
+    /// above the fitting one.
+    pub fn is_consistent(&self) -> bool {
+        let shares = [self.missing_share, self.occluded_share, self.standing_share];
+        self.causes.has(self.cause)
+            && shares.iter().all(|share| (0.0..=1.0).contains(share))
+            && (0.0..=self.fits_mps).contains(&self.with_losses_mps)
+    }
+
     /// Causes and speed of the section, for the counts of its run.
     pub fn failing(&self) -> Failing {
         Failing { causes: self.causes, again_mps: self.with_losses_mps }

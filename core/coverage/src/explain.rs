@@ -73,7 +73,7 @@ pub fn explain<'a>(
     let is_by_chance = !is_lossy || sampled.is_by_chance(hole_m, drive.along_m(), drive.lost);
     let passes_needed = if is_by_chance { here.max(drive.passes_needed) } else { MOST_PASSES };
     let lost = case.lacks.between(case.hole.x_m - radius_m, case.hole.x_m + radius_m).filter(in_hole).count();
-    Evidence {
+    let evidence = Evidence {
         cause: causes.iter().next().unwrap_or(Cause::Unknown),
         causes,
         speed_mps: drive.speed_mps,
@@ -90,7 +90,9 @@ pub fn explain<'a>(
         middle_t_y_m: drive.middle_t_y_m,
         swing_m: drive.swing_m,
         silent_heads: seen.silent,
-    }
+    };
+    debug_assert!(evidence.is_consistent(), "causes and figures of a fail agree: {evidence:?}");
+    evidence
 }
 
 /// Factors that were present at the section.

@@ -35,12 +35,14 @@ pub struct HeadReach {
 impl HeadReach {
     /// Creates the reach after a ping with a fix at `now`; `before` is the reach before this ping.
     pub fn after(before: Option<Self>, now: MonoNs, reach: Reach) -> Self {
+        debug_assert!(reach.is_ordered(), "a reach begins before it ends: {reach:?}");
         let swept = before.and_then(|before| before.swept).map_or(reach, |swept| swept.with(reach));
         Self { heard: Some(now), latest: reach, swept: Some(swept) }
     }
 
     /// Creates the reach of a silent head that would be at `reach` if it pinged.
     pub fn silent_at(before: Option<Self>, reach: Reach) -> Self {
+        debug_assert!(reach.is_ordered(), "a reach begins before it ends: {reach:?}");
         before.map_or(Self { heard: None, latest: reach, swept: None }, |before| Self {
             latest: reach,
             ..before
@@ -251,6 +253,7 @@ impl Frontier {
 
     /// Records the combined reach of all heads, pinging or not, at an update.
     pub fn pass(&mut self, all: Reach) {
+        debug_assert!(all.is_ordered(), "a reach begins before it ends: {all:?}");
         let through = self.through.unwrap_or(Reach { from_m: all.to_m, to_m: all.from_m });
         self.through =
             Some(Reach { from_m: through.from_m.min(all.to_m), to_m: through.to_m.max(all.from_m) });
@@ -292,6 +295,7 @@ impl Frontier {
         self.hear(now);
         self.swept = Some(self.swept.map_or(pinged, |swept| swept.with(pinged)));
         self.way = Some(self.way.map_or(pinged, |way| way.with(pinged)));
+        debug_assert!(self.has_been_where_it_swept(), "{:?} is within {:?}", self.swept, self.way);
         self.move_zone(heads, now, section_m, margin_m)
     }
 
@@ -309,6 +313,7 @@ impl Frontier {
     ) -> Moved {
         self.woken = self.woken.or(Some(now));
         let index = |x_m: f64| math::floor_to_i64(x_m / section_m);
+        debug_assert!(span.is_ordered(), "a span begins before it ends: {span:?}");
         let way = self.way.map_or(span, |way| way.with(span));
         let sections = |way: Reach| (index(way.from_m), index(way.to_m));
         let way_grown = self.way.map(sections) != Some(sections(way));
@@ -323,6 +328,11 @@ impl Frontier {
             _ => self.move_zone(heads, now, section_m, margin_m),
         };
         Moved { way_grown, ..moved }
+    }
+
+    /// Whether the stretch within reach of the heads is part of the coverage extent.
+    fn has_been_where_it_swept(&self) -> bool {
+        self.swept.zip(self.way).is_some_and(|(swept, way)| swept.is_ordered() && way.with(swept) == way)
     }
 
     fn move_zone(
@@ -342,6 +352,7 @@ impl Frontier {
         // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
         let first = math::floor_to_i64((all.from_m - margin_m) / section_m);
         let end = -math::floor_to_i64(-(all.to_m + margin_m) / section_m);
+        debug_assert!(first <= end, "a zone begins before it ends: {all:?} gives {first} to {end}");
         let zone = first..end;
         if self.zone.as_ref() != Some(&zone) {
             self.zone_moved = Some(now);
@@ -372,6 +383,11 @@ impl Moved {
 }
 
 impl Reach {
+    /// Whether the stretch begins at or before its end.
+    pub fn is_ordered(&self) -> bool {
+        self.from_m <= self.to_m
+    }
+
     /// Centre of the stretch, m.
     pub fn middle_m(&self) -> f64 {
         f64::midpoint(self.from_m, self.to_m)

@@ -62,6 +62,17 @@ pub struct Hole {
 }
 
 impl Hole {
+    /// Whether the bounds enclose the diameter, and the upper bound is finite exactly if the hole is bounded.
+    pub fn is_consistent(&self) -> bool {
+        let Self { diameter_m, least_m, most_m, x_m, arc_m, bounded } = *self;
+        let are_bounds = 0.0 <= least_m && least_m <= diameter_m && diameter_m <= most_m;
+        are_bounds
+            && diameter_m.is_finite()
+            && most_m.is_finite() == bounded
+            && x_m.is_finite()
+            && arc_m >= 0.0
+    }
+
     /// Whether two holes differ by less than a centimetre in every respect.
     pub fn is_like(&self, other: &Self) -> bool {
         const LITTLE_M: f64 = 0.01;
@@ -196,6 +207,8 @@ pub struct HoleFinder {
     tolerance_m: f64,
     /// Radius of the last hole, m: the first guess for the next search.
     last_m: f64,
+    /// Radius of the largest circle for which the changed wall was last laid out, m.
+    laid_m: f64,
     window: Window,
     tiles: Vec<Tile>,
     division: Division,
@@ -207,7 +220,7 @@ impl Default for HoleFinder {
     }
 }
 
-stateful!(HoleFinder { state: last_m; fixed: tolerance_m, window, tiles, division; });
+stateful!(HoleFinder { state: last_m; fixed: tolerance_m, laid_m, window, tiles, division; });
 
 impl HoleFinder {
     /// Creates a search that finds D to within a tolerance, m; zero means an exact search.
@@ -217,6 +230,7 @@ impl HoleFinder {
         Self {
             tolerance_m,
             last_m: 0.0,
+            laid_m: 0.0,
             window: Window::default(),
             tiles: Vec::with_capacity(16_384),
             division: Division::default(),
@@ -236,6 +250,7 @@ impl HoleFinder {
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest_since(&mut self, store: &SampleStore, from_m: f64, to_m: f64, first_visit: u32) -> Hole {
+        debug_assert!(from_m < to_m, "a section has a length: {from_m} to {to_m} m");
         let length_m = to_m - from_m;
         let mut reach_m = (1.25 * self.last_m + 0.1).min(FARTHEST_M);
         loop {
@@ -326,18 +341,27 @@ impl HoleFinder {
         let diameter_m = 2.0 * best.distance_m;
         // Samples dropped because the window was full could only have reduced D.
         let least_m = diameter_m - 2.0 * (fidelity.thinned_m + fidelity.moved_m);
-        Hole {
+        let hole = Hole {
             diameter_m,
             least_m: if self.window.overfull { 0.0 } else { least_m.max(0.0) },
             most_m: 2.0 * (radius_m + fidelity.moved_m),
             x_m: self.window.chainage_m(best.x_m),
             arc_m: math::wrap(best.arc_m, self.window.perimeter_m()),
             bounded: true,
-        }
+        };
+        debug_assert!(hole.is_consistent(), "bounds enclose the diameter: {hole:?}");
+        debug_assert!(best.is_within(length_m), "a hole is centred in a section of {length_m} m: {best:?}");
+        hole
     }
 }
 
 impl Best {
+    /// Whether the point lies in a section of this length, within the search radius of a sample.
+    fn is_within(&self, length_m: f64) -> bool {
+        let is_inside = (-ROUNDING_M..=length_m + ROUNDING_M).contains(&self.x_m);
+        is_inside && (0.0..=FARTHEST_M + ROUNDING_M).contains(&self.distance_m)
+    }
+
     fn take(&mut self, distance_m: f64, x_m: f64, arc_m: f64) {
         if distance_m > self.distance_m {
             *self = Self { distance_m, x_m, arc_m, ..*self };

@@ -60,6 +60,11 @@ impl MissingSamples {
             self.ring.push(lack);
         }
         self.extend(at, lack.x_m);
+        let (kept, blocks) = (self.ring.len(), self.extents_m.len());
+        debug_assert!(
+            kept <= ROOM && blocks == kept.div_ceil(BLOCK),
+            "{kept} samples are in {blocks} blocks"
+        );
     }
 
     /// Extends a block's extent by the entry at this position of the ring.
@@ -74,7 +79,9 @@ impl MissingSamples {
         };
         *extent_m = wider_m(*extent_m, x_m);
         if (at + 1).is_multiple_of(BLOCK) {
-            let latest = self.ring.get(block * BLOCK..=at).unwrap_or_default();
+            let latest = self.ring.get(block * BLOCK..=at);
+            debug_assert!(latest.is_some(), "sample {at} is one of {}", self.ring.len());
+            let latest = latest.unwrap_or_default();
             *extent_m = latest.iter().fold([x_m; 2], |extent_m, lack| wider_m(extent_m, lack.x_m));
         }
     }

@@ -65,7 +65,9 @@ impl Opening {
     pub fn share_of(&self, from_m: f64, to_m: f64, profile: &Profile) -> f64 {
         let along_m = (to_m.min(self.to_m) - from_m.max(self.from_m)).max(0.0);
         let perimeter_m = profile.perimeter_m();
-        along_m / (to_m - from_m) * self.arc(perimeter_m).1 / perimeter_m
+        let share = along_m / (to_m - from_m) * self.arc(perimeter_m).1 / perimeter_m;
+        debug_assert!((0.0..=1.0 + 1e-9).contains(&share), "an opening covers a share of a section: {share}");
+        share
     }
 }
 

@@ -150,7 +150,10 @@ impl Relief {
             return;
         }
         let (me, distrusted) = (bit(head), self.distrusted);
-        let Some(cell) = self.cell_mut(slab, bin) else { return };
+        let Some(cell) = self.cell_mut(slab, bin) else {
+            debug_assert!(false, "bin {bin} of slab {slab} has a place");
+            return;
+        };
         if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
             // This head agrees with the design here, so an object that was seen only once is gone.
             cell.off = None;
@@ -192,6 +195,7 @@ impl Relief {
 
     /// Returns the votes on a head.
     pub(super) fn ballot(&self, head: usize) -> Ballot {
+        debug_assert!(head < MAX_HEADS, "head {head} is one of {MAX_HEADS}");
         self.ballots.get(head).copied().unwrap_or_default()
     }
 

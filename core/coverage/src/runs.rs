@@ -49,6 +49,15 @@ pub struct Run {
 }
 
 impl Run {
+    /// Whether an open run's figures agree: its ends, the counts of its sections, and its largest hole.
+    fn is_consistent(&self) -> bool {
+        let Self { from, to, failed, .. } = *self;
+        let is_counted = self.counts.iter().all(|count| *count <= failed) && self.tally.is_of(failed);
+        let is_open = self.cleared.is_none() && self.merged_into.is_none();
+        let is_within = i64::from(failed) <= to - from && (from..to).contains(&self.worst.0);
+        is_counted && is_open && is_within
+    }
+
     /// Whether any section of the run still fails.
     pub fn is_open(&self) -> bool {
         self.failed > 0
@@ -96,6 +105,7 @@ impl Run {
     fn count_out(&mut self, section: &Failing) -> bool {
         for cause in section.causes.iter() {
             if let Some(count) = self.counts.get_mut(cause as usize) {
+                debug_assert!(*count > 0, "a removed section was counted for {cause:?}");
                 *count = count.saturating_sub(1);
             }
         }
@@ -186,7 +196,8 @@ impl Runs {
     ///
     /// Allocates: never.
     pub fn set(&mut self, section: i64, failing: Option<Failing>, telling: &mut Telling<'_>) {
-        match (self.of(section), failing) {
+        let was_in = self.of(section);
+        match (was_in, failing) {
             (Some(id), Some(failing)) => {
                 let before = self.failing_at(section);
                 self.put_down_to(section, failing);
@@ -198,11 +209,29 @@ impl Runs {
             (None, Some(failing)) => self.join(section, failing, telling),
             (None, None) => {}
         }
+        for id in [was_in, self.of(section)].into_iter().flatten() {
+            debug_assert!(self.is_consistent(id), "{id:?} fits its sections: {:?}", self.get(id));
+        }
+    }
+
+    /// Whether a run is closed, or begins and ends with its own sections and is too far from other runs to be joined.
+    fn is_consistent(&self, id: RunId) -> bool {
+        let is_own = |section: i64| self.of(section) == Some(id);
+        let is_apart = |section: i64| self.of(section).is_none_or(|of| of == id);
+        self.get(id).is_some_and(|run| {
+            let Run { from, to, .. } = *run;
+            let mut beside = (from - self.join..from).chain(to..to + self.join);
+            let fits = is_own(from) && is_own(to - 1) && beside.all(is_apart);
+            !run.is_open() || run.is_consistent() && fits
+        })
     }
 
     /// Replaces a section's entry in the counts of its run.
     fn count_again(&mut self, id: RunId, [before, now]: [&Failing; 2]) {
-        let Some(mut run) = self.get(id).copied() else { return };
+        let Some(mut run) = self.get(id).copied() else {
+            debug_assert!(false, "{id:?} of a section is one of {} runs", self.runs.len());
+            return;
+        };
         let was_least = run.count_out(before);
         if was_least && !run.tally.is_least(now) {
             run.count_none();
@@ -219,6 +248,7 @@ impl Runs {
 
     /// Causes for which a section fails.
     fn failing_at(&self, section: i64) -> Failing {
+        debug_assert!(self.slot(section).is_some(), "section {section} is one of {}", self.member.len());
         self.slot(section).and_then(|slot| self.failing.get(slot)).copied().unwrap_or_default()
     }
 
@@ -254,7 +284,10 @@ impl Runs {
     /// Removes a section from its run, which shrinks, splits or is cleared.
     fn leave(&mut self, section: i64, id: RunId, telling: &mut Telling<'_>) {
         self.take_out(section);
-        let Some(run) = self.get(id).copied() else { return };
+        let Some(run) = self.get(id).copied() else {
+            debug_assert!(false, "{id:?} is one of {} runs", self.runs.len());
+            return;
+        };
         let mut after = (section + 1..run.to).filter(|index| self.of(*index) == Some(id));
         let later = after.next();
         let earlier = (run.from..section).rev().find(|index| self.of(*index) == Some(id));
@@ -304,7 +337,10 @@ impl Runs {
     }
 
     fn merge(&mut self, other: RunId, kept: RunId, at: MonoNs) {
-        let Some(run) = self.get(other).copied() else { return };
+        let Some(run) = self.get(other).copied() else {
+            debug_assert!(false, "{other:?} is one of {} runs", self.runs.len());
+            return;
+        };
         for index in run.from..run.to {
             if self.of(index) == Some(other) {
                 self.put(index, kept);
@@ -350,7 +386,10 @@ impl Runs {
 
     /// Recomputes a run's section count, causes, ends and worst hole.
     fn measure(&mut self, id: RunId, telling: &Telling<'_>) {
-        let Some(run) = self.get(id).copied() else { return };
+        let Some(run) = self.get(id).copied() else {
+            debug_assert!(false, "{id:?} is one of {} runs", self.runs.len());
+            return;
+        };
         let members = || (run.from..run.to).filter(|index| self.of(*index) == Some(id));
         let failed = u32::try_from(members().count()).unwrap_or(u32::MAX);
         let holes = members().filter_map(|index| Some((index, (telling.hole)(index)?)));

@@ -84,6 +84,7 @@ impl Spread {
         self.count += other.count;
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
+        debug_assert!(self.scatter >= 0.0 && self.min <= self.max, "squares have a sum: {self:?}");
     }
 
     /// Mean; `None` without values.
@@ -173,6 +174,22 @@ impl Section {
     /// Whether the section has a flag that no later pass has cleared.
     pub fn is_flagged(&self) -> bool {
         self.flagged.is_some() && self.cleared.is_none()
+    }
+
+    /// Whether verdict, hole, flag and evidence of a section that was just judged agree.
+    ///
+    /// A pass has a hole with D + k sd <= T. A fail has evidence and a flag. Only an open section is not inspected.
+    pub(super) fn is_consistent(&self, target_m: f64, confidence_sd: f64) -> bool {
+        let error_m = confidence_sd * self.hole_sd_m;
+        let is_judged = self.hole.is_some_and(|hole| hole.is_consistent()) && error_m >= 0.0;
+        let is_small = |hole: Hole| hole.bounded && hole.most_m + error_m <= target_m;
+        is_judged
+            && match self.verdict {
+                Verdict::Pass => self.settled && !self.is_flagged() && self.hole.is_some_and(is_small),
+                Verdict::Fail => self.evidence.is_some() && self.is_flagged(),
+                Verdict::Open | Verdict::CannotSay => true,
+            }
+            && (self.verdict == Verdict::Open || !self.not_inspected)
     }
 
     /// Whether the section's samples contradict the design profile, on which all other measurements rely.

@@ -377,6 +377,11 @@ impl Sections {
     pub fn metres(&self, way: Option<Reach>) -> Metres {
         let mut metres = Metres::default();
         let (mut all, section_m) = (self.sections_of(way).count(), self.section_m);
+        let judged: u32 = self.judged.iter().sum();
+        debug_assert!(
+            judged as usize <= all,
+            "judged sections are in the coverage extent: {judged} of {all}"
+        );
         for (verdict, count) in Verdict::ALL.into_iter().zip(self.judged) {
             if verdict != Verdict::Open {
                 metres.add(verdict, f64::from(count) * section_m);
@@ -405,8 +410,14 @@ impl Sections {
 
     /// Adds a flagged section to its run, or removes a section whose flag was cleared.
     fn tell_runs(&mut self, request: &Request, judging: &mut Judging<'_>) {
-        let Self { sections, runs, first, .. } = self;
+        let Self { sections, runs, first, target_m, confidence_sd, .. } = self;
         let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
+        let is_consistent = |section: &Section| section.is_consistent(*target_m, *confidence_sd);
+        debug_assert!(
+            get(request.section).is_some_and(is_consistent),
+            "a judged section agrees with a target of {target_m} m: {:?}",
+            get(request.section)
+        );
         let flagged = get(request.section).filter(|section| section.is_flagged());
         let evidence = flagged.and_then(|section| section.evidence);
         let failing = evidence.as_ref().map(Evidence::failing);
@@ -434,6 +445,7 @@ impl Sections {
             let section = self.get(index).filter(|section| section.is_flagged());
             section.and_then(|section| section.evidence).map_or(Causes::default(), |evidence| evidence.causes)
         };
+        debug_assert!(self.get(request.section).is_some(), "section {} exists", request.section);
         let here = self.get(request.section).copied().unwrap_or_default();
         let (visits, passage) = (here.visits, here.passage);
         let case = Case {
@@ -504,6 +516,11 @@ impl Sections {
 ///
 /// A verdict holds for both bounds of D.
 pub(super) fn verdict(hole: &Hole, error_m: f64, target_m: f64, clear_m: f64) -> Verdict {
+    debug_assert!(hole.is_consistent(), "bounds enclose the diameter: {hole:?}");
+    debug_assert!(
+        error_m >= 0.0 && clear_m >= 0.0,
+        "error and distance aren't negative: {error_m}, {clear_m} m"
+    );
     let is_left = 2.0 * clear_m >= hole.diameter_m;
     if hole.bounded && hole.most_m + error_m <= target_m {
         Verdict::Pass

@@ -89,7 +89,10 @@ impl Soundings {
     pub fn add(&mut self, x_m: f64, arc_m: f64) -> bool {
         let inside = x_m >= self.layout.from_m && x_m <= self.layout.to_m && arc_m.is_finite();
         let Some(index) = inside.then(|| self.index(x_m, arc_m)).flatten() else { return false };
-        let Some(count) = self.counts.get_mut(index) else { return false };
+        let Some(count) = self.counts.get_mut(index) else {
+            debug_assert!(false, "node {index} of a sample inside is one of {}", self.counts.len());
+            return false;
+        };
         *count = count.saturating_add(1);
         true
     }

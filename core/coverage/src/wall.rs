@@ -74,6 +74,7 @@ impl Run {
 
     /// Adds a waiting return.
     fn add(&mut self, placed: &PlacedReturn, limits: &WallLimits) {
+        debug_assert!(!self.is_full(), "a run is given up when {MOST_WAITING} returns wait: {}", self.waits);
         let first = *self.first.get_or_insert(*placed);
         self.all += 1;
         self.off_m = self.off_m.max(placed.off_m.abs());

@@ -71,6 +71,7 @@ pub fn settle(
         }
         // The prior keeps the determinant positive.
         let determinant = hyy * hzz - hyz * hyz;
+        debug_assert!(determinant > 0.0, "the prior keeps the determinant positive: {determinant}");
         let moved =
             [at[0] + (hzz * gy - hyz * gz) / determinant, at[1] + (hyy * gz - hyz * gy) / determinant];
         if !profile.contains(moved) {

@@ -205,6 +205,14 @@ impl<To, From> Rot<To, From> {
         [q.w, q.i, q.j, q.k]
     }
 
+    /// Whether the quaternion has unit length, within the rounding errors of a long product of rotations.
+    pub fn is_unit(&self) -> bool {
+        /// Limit of the squared length's error. Products of a ten-hour dive at 600 Hz stay below 1e-8.
+        const DRIFT: f64 = 1e-6;
+        let [w, x, y, z] = self.wxyz();
+        (w * w + x * x + y * y + z * z - 1.0).abs() <= DRIFT
+    }
+
     /// The inverse rotation.
     pub fn inverse(&self) -> Rot<From, To> {
         Rot(self.0.inverse(), PhantomData)
@@ -245,6 +253,7 @@ pub struct Pose {
 impl Pose {
     /// Returns the tunnel-frame position of a body-frame point.
     pub fn place(&self, offset: Vec3<Body>) -> Point3<Tunnel> {
+        debug_assert!(self.attitude.is_unit(), "an attitude is a unit quaternion: {:?}", self.attitude);
         self.position + self.attitude * offset
     }
 }

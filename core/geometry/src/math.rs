@@ -79,12 +79,13 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
         let r = value + modulus;
         return if r >= modulus { 0.0 } else { r };
     }
+    debug_assert!(modulus > 0.0 && modulus.is_finite(), "a modulus is positive and finite: {modulus}");
     let r = value - modulus * libm::floor(value / modulus);
     // Rounding can make r equal to the modulus, or slightly negative.
     if r >= modulus || r < 0.0 { 0.0 } else { r }
 }
 
-/// Wraps `difference` to [-`modulus`/2, `modulus`/2), the shorter way round.
+/// Wraps `difference` to [-`modulus`/2, `modulus`/2), the shorter way round. `modulus` must be positive and finite.
 pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
     // The branches are as in `wrap`. Near half a modulus, rounding matters, so the quotient is used.
     let size = difference.abs();
@@ -94,6 +95,7 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
     if size > 0.501 * modulus && size < 1.499 * modulus {
         return if difference > 0.0 { difference - modulus } else { difference + modulus };
     }
+    debug_assert!(modulus > 0.0 && modulus.is_finite(), "a modulus is positive and finite: {modulus}");
     let r = difference - modulus * libm::floor(difference / modulus + 0.5);
     if r >= modulus / 2.0 { r - modulus } else { r }
 }

@@ -198,26 +198,25 @@ impl Advisor {
         if situation.heads.iter().all(Option::is_none) {
             return Advice::nothing(Reason::NoReturns);
         }
+        let is_turning = |motion: &HeadMotion| motion.is_turning();
+        debug_assert!(situation.heads.iter().flatten().all(is_turning), "heads turn: {:?}", situation.heads);
         if !self.look(situation, &pose) {
             return Advice::nothing(Reason::NoHeadingOrFix);
         }
         if situation.speed_mps.abs() > UNDER_WAY_MPS {
             self.astern = situation.speed_mps < 0.0;
         }
+        let advice = self.advise_at(&pose, situation, swing, left_s);
+        debug_assert!(advice.is_consistent(), "the figures of an advice agree: {advice:?}");
+        advice
+    }
+
+    /// Returns the advice for a vehicle at `pose`, from which the heads' rings have been cast.
+    fn advise_at(&mut self, pose: &Pose, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
         let sector = |head: usize| self.heads.get(head)?.sector.as_ref();
         let phasing = Phasing::of(situation).in_sectors_of(situation, sector);
         let passes = phasing.at(situation.speed_mps).beside(self.parallax_rad);
-        let ping_period_s =
-            situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
-        let farthest_m = self.profile.farthest_m([pose.position.y(), pose.position.z()]);
-        let going = Going {
-            ping_period_s,
-            swing_mps: swing.rate_radps * farthest_m,
-            shift_m: 0.0,
-            apart_m: phasing.apart_m(),
-            apart_swing_mps: phasing.neighbours_apart() * swing.apart_rate_radps * farthest_m,
-            swing_most_m: Some(swing.most_rad * farthest_m),
-        };
+        let going = self.going(pose, situation, &phasing, swing);
         let sure = self.sure(&phasing, &passes, situation);
         let sure_m = sure.at_m(situation.speed_mps);
         let lossy = passes.lossy(true);
@@ -255,7 +254,7 @@ impl Advisor {
             pass_gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
             even_pass_gap_s: passes.even_gap_s(),
             t_y_m: self.now.largest_step_m(0),
-            ping_period_s,
+            ping_period_s: going.ping_period_s,
             phase_error_rad: errors
                 .max_by(|a, b| a.abs().total_cmp(&b.abs()))
                 .filter(|_| passes.heads().len() > 1),
@@ -266,6 +265,20 @@ impl Advisor {
             anew: self.anew,
             margins: self.margins,
             lost_share: mean(situation.losses_of_turning().map(|rate| rate.share)),
+        }
+    }
+
+    /// Returns the motion of the vehicle and its beams.
+    fn going(&self, pose: &Pose, situation: &Situation, phasing: &Phasing, swing: Swing) -> Going {
+        let periods_s = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
+        let farthest_m = self.profile.farthest_m([pose.position.y(), pose.position.z()]);
+        Going {
+            ping_period_s: periods_s.fold(0.0, f64::max),
+            swing_mps: swing.rate_radps * farthest_m,
+            shift_m: 0.0,
+            apart_m: phasing.apart_m(),
+            apart_swing_mps: phasing.neighbours_apart() * swing.apart_rate_radps * farthest_m,
+            swing_most_m: Some(swing.most_rad * farthest_m),
         }
     }
 
@@ -363,6 +376,7 @@ impl Advisor {
             Err(why) => return Err(*why),
         };
         let speed_mps = driving.fastest_mps(last_mps);
+        debug_assert!(speed_mps >= 0.0 && speed_mps.is_finite(), "a speed is zero or more: {speed_mps} m/s");
         if speed_mps <= 0.0 {
             bound?;
         }

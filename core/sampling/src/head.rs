@@ -165,6 +165,12 @@ pub struct HeadMotion {
 }
 
 impl HeadMotion {
+    /// Whether the head turns in steps: the rate isn't zero, the step is positive, and both are finite.
+    pub fn is_turning(&self) -> bool {
+        let [rate_radps, step_rad] = [self.rate_radps.abs(), self.step_rad];
+        rate_radps > 0.0 && rate_radps.is_finite() && step_rad > 0.0 && step_rad.is_finite()
+    }
+
     /// Time of a whole turn at this rate, seconds.
     pub fn turn_period_s(&self) -> f64 {
         TAU / self.rate_radps.abs()

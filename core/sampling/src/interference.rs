@@ -45,6 +45,10 @@ pub fn exposures(
                 let (Some(at), Some(bt)) =
                     (schedule.angle_rad(first, since), schedule.angle_rad(second, since))
                 else {
+                    debug_assert!(
+                        false,
+                        "heads {first} and {second} are scheduled from the start on: {since:?}"
+                    );
                     continue;
                 };
                 if pair.facing([at, bt]) {

@@ -42,10 +42,18 @@ pub struct LossRate {
 impl LossRate {
     /// Creates the rate of pings that are lost independently of each other.
     pub fn independent(share: f64) -> Self {
-        Self { share, after_lost: share }
+        let rate = Self { share, after_lost: share };
+        debug_assert!(rate.is_valid(), "a share of lost pings is from 0 to 1: {share}");
+        rate
+    }
+
+    /// Whether both shares are from 0 to 1.
+    pub fn is_valid(&self) -> bool {
+        [self.share, self.after_lost].iter().all(|share| (0.0..=1.0).contains(share))
     }
 
     fn clamped(self) -> Self {
+        debug_assert!(self.is_valid(), "shares of lost pings are from 0 to 1: {self:?}");
         Self { share: self.share.clamp(0.0, MOST_SHARE), after_lost: self.after_lost.clamp(0.0, MOST_SHARE) }
     }
 
@@ -106,7 +114,12 @@ impl Sampled {
         let places = self.perimeter_m / self.t_y_m * STRETCH_M / along_m;
         // More passes have more places at which they may fail together.
         let once = self.passes_for(places, along_m, heads);
-        self.passes_for(places * once, along_m, heads)
+        let passes = self.passes_for(places * once, along_m, heads);
+        debug_assert!(
+            (1.0..=MOST_PASSES).contains(&passes),
+            "lost returns need 1 to {MOST_PASSES} passes: {passes}"
+        );
+        passes
     }
 
     /// Whether a hole of this diameter, m, may have been caused by chance.

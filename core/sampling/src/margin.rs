@@ -46,7 +46,12 @@ pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
     let least_m = math::sqrt(LEFT_SHARE * LEFT_SHARE * along_m2 + t_y_m * t_y_m);
     let most_m = (target_m - least_m).clamp(0.0, MOST_SHARE * target_m);
-    (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(most_m)
+    let margin_m = (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(most_m);
+    debug_assert!(
+        (0.0..=MOST_SHARE * target_m).contains(&margin_m),
+        "a margin is at most a fifth of the target of {target_m} m: {margin_m} m"
+    );
+    margin_m
 }
 
 /// Exponent with which position errors grow with the time between two passes.

@@ -23,6 +23,9 @@ const SAME_TURN: f64 = 0.02;
 /// Below it, the head is askew: its scan plane meets no wall near the vehicle.
 const ASKEW: f64 = 0.1;
 
+/// Limit of the rounding errors in shares of a turn or of a length.
+const ROUNDING: f64 = 1e-9;
+
 /// Measured state of a vehicle and its heads at one epoch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Situation {
@@ -190,7 +193,9 @@ impl Phasing {
             sum_m += before.map_or(0.0, |before| (ahead_m(head) - ahead_m(before)).abs());
             before = Some(head);
         }
-        sum_m / (apart_m * self.heads.len() as f64)
+        let share = sum_m / (apart_m * self.heads.len() as f64);
+        debug_assert!((0.0..=1.0 + ROUNDING).contains(&share), "neighbours are within all heads: {share}");
+        share
     }
 
     /// Returns the heads with the phases of a schedule of `scheduled` heads for `planned_mps`.
@@ -473,7 +478,13 @@ fn largest_gap(phases: &mut [f64]) -> f64 {
         [a, b] => b - a,
         _ => 0.0,
     });
-    between.fold(wrapped, f64::max)
+    let gap = between.fold(wrapped, f64::max);
+    let even = 1.0 / phases.len().max(1) as f64;
+    debug_assert!(
+        (even - ROUNDING..=1.0 + ROUNDING).contains(&gap),
+        "the largest gap is at least that of even phases, {even}, and at most a turn: {gap} of {phases:?}"
+    );
+    gap
 }
 
 /// 1 if the head's angles grow in the body's sense, -1 if they grow in the opposite sense.

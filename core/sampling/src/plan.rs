@@ -174,7 +174,10 @@ impl Planner {
     /// Errors: a target that isn't above zero, or that no speed meets.
     pub fn v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
         let known_mps = self.known_v_max_mps(mode, target_m)?;
-        let Some(planned) = self.modes.get(mode) else { return Ok(known_mps) };
+        let Some(planned) = self.modes.get(mode) else {
+            debug_assert!(false, "mode {mode}, which has a speed, is one of {}", self.modes.len());
+            return Ok(known_mps);
+        };
         // At a lower speed, heads apart along the hull pass a place later after each other, so the margin is larger.
         // The iteration starts from above, and each speed leads to a lower one until the speeds converge.
         let mut speed_mps = known_mps;
@@ -340,7 +343,10 @@ impl Planner {
             let turn = modes.iter().find(|mode| Some(mode.name) == name)?.turn;
             Some(HeadSpec { step_rad: turn.step_rad(), ping_period_s: turn.ping_period_s(), ..*spec })
         };
-        self.inspection.heads.iter().filter_map(of_head).collect()
+        let specs: Vec<HeadSpec> = self.inspection.heads.iter().filter_map(of_head).collect();
+        let heads = if name.is_some() { self.inspection.heads.len() } else { 0 };
+        debug_assert!(specs.len() == heads, "all of {heads} heads have mode {name:?}: {}", specs.len());
+        specs
     }
 
     /// Schedule of the heads in a mode at a speed.

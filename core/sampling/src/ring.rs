@@ -188,10 +188,21 @@ impl Ring {
             way_m += math::wrap_signed(b.arc_m - a.arc_m, self.perimeter_m);
         }
         self.way_m.push(way_m);
+        debug_assert!(
+            self.is_closed(),
+            "a turn goes round whole perimeters of {} m: {way_m} m",
+            self.perimeter_m
+        );
         // Capacity for `keep_steps`, which must not allocate.
         self.steps_m.clear();
         self.steps_m.reserve(self.soundings.len());
         Ok(())
+    }
+
+    /// Whether the arc length of the whole turn is a multiple of the perimeter.
+    fn is_closed(&self) -> bool {
+        let rounds = self.way_round_m() / self.perimeter_m;
+        (rounds - math::round_to_i64(rounds) as f64).abs() <= 1e-6
     }
 
     /// Computes the beam directions of a turn, unless the last cast had the same directions.
@@ -219,7 +230,14 @@ impl Ring {
 
     /// The distances cached by [`Ring::keep_steps`]; `None` for another stride.
     pub fn kept_steps_m(&self, stride: usize) -> Option<&[f64]> {
-        (self.stride == stride).then_some(self.steps_m.as_slice())
+        let is_kept = self.stride == stride;
+        debug_assert!(
+            !is_kept || self.steps_m.len() == self.soundings.len(),
+            "there is a distance for each of {} soundings: {}",
+            self.soundings.len(),
+            self.steps_m.len()
+        );
+        is_kept.then_some(self.steps_m.as_slice())
     }
 
     /// Number of soundings per step for `count` soundings per turn, rounded up; at least one.

@@ -139,6 +139,13 @@ impl Strips {
             alike
         });
         self.join_at_the_seam();
+        debug_assert!(self.covers_perimeter(), "strips cover {perimeter_m} m: {:?}", self.strips);
+    }
+
+    /// Whether the lengths of all strips add up to the perimeter.
+    fn covers_perimeter(&self) -> bool {
+        let sum_m: f64 = self.strips.iter().map(|strip| strip.arc.length_m).sum();
+        (sum_m - self.perimeter_m).abs() <= 1e-6 * self.perimeter_m
     }
 
     /// Joins the last strip with the first one across the seam if they are alike.
@@ -218,7 +225,10 @@ impl Strips {
     /// The neighbours may have another time between passes.
     fn seen_alike(&self, k: usize) -> Arc {
         let count = self.strips.len();
-        let Some(strip) = self.strips.get(k) else { return Arc { from_m: 0.0, length_m: 0.0 } };
+        let Some(strip) = self.strips.get(k) else {
+            debug_assert!(false, "strip {k} is one of {count}");
+            return Arc { from_m: 0.0, length_m: 0.0 };
+        };
         let is_alike = |beside: &&Strip| beside.seen_by == strip.seen_by && beside.hidden == strip.hidden;
         let alike = |number: usize| Some(self.strips.get(number % count).filter(is_alike)?.arc.length_m);
         let forward_m: f64 = (k..k + count).map_while(alike).sum();
@@ -391,7 +401,10 @@ impl Strips {
         let back = (1..count).map(|step| k + count - step).map_while(&thin);
         let (mut width_m, mut step_m, mut hidden, mut is_left_out) = (0.0, 0.0_f64, false, true);
         for number in forward.chain(back) {
-            let Some(strip) = self.strips.get(number) else { continue };
+            let Some(strip) = self.strips.get(number) else {
+                debug_assert!(false, "strip {number} is one of {count}");
+                continue;
+            };
             width_m += strip.arc.length_m;
             hidden |= strip.hidden;
             is_left_out &= strip.seen_by.is_empty() && !strip.hidden;
@@ -414,6 +427,7 @@ impl Strips {
         let all = HeadSet::first(MAX_HEADS);
         for k in 0..self.strips.len() {
             let (Some(strip), Some(steps_m)) = (self.strips.get(k), self.steps_m.get(first + k)) else {
+                debug_assert!(false, "the steps on strip {k} are measured in setting {setting}");
                 return;
             };
             let perimeter_m = self.seen_alike(k).length_m;
@@ -472,6 +486,10 @@ fn note_step(
     for _ in 0..count {
         let (Some(strip), Some(steps)) = (strips.get(number), steps_m.get_mut(setting * count + number))
         else {
+            debug_assert!(
+                false,
+                "strip {number} is one of {count}, each with its steps in setting {setting}"
+            );
             return;
         };
         note_on(strip, steps, from.head, step_m);

@@ -50,6 +50,7 @@ impl Looks {
     ///
     /// Allocates: never.
     pub fn keep(&mut self, at: MonoNs, look: Vec3<Tunnel>) {
+        debug_assert!((look.norm() - 1.0).abs() < 1e-6, "a direction is a unit vector: {look:?}");
         if self.looks.len() < BEATS {
             self.looks.push((at, look));
         } else if let Some(slot) = self.looks.get_mut(self.count % BEATS) {
@@ -131,7 +132,9 @@ mod tests {
         for _ in 0..headrace_geometry::math::round_to_i64(seconds * 5.0) {
             at = at + DurNs(BEAT);
             let [yaw, pitch] = yaw_pitch(at.as_secs_f64());
-            looks.keep(at, Vec3::new(math::cos(yaw), math::sin(yaw), -math::sin(pitch)));
+            let level = math::cos(pitch);
+            let look = Vec3::new(level * math::cos(yaw), level * math::sin(yaw), -math::sin(pitch));
+            looks.keep(at, look);
         }
         (looks, at)
     }

@@ -93,6 +93,7 @@ impl AlertTiming {
         if let Some(slot) = self.0.get_mut(class as usize) {
             *slot = timing;
         }
+        debug_assert!(self.of(class) == timing, "the delays of {class:?} are {timing:?}: {self:?}");
         self
     }
 

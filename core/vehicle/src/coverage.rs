@@ -126,7 +126,9 @@ fn parse_opening(section: &Section<'_>, profile: Option<&Profile>) -> Result<Ope
 fn arc_at_hour_m(profile: &Profile, hour: f64) -> f64 {
     let angle = (hour - 6.0) / 12.0 * TAU;
     let direction = [math::sin(angle), -math::cos(angle)];
-    profile.cast(profile.reference(), direction).map_or(0.0, |wall| wall.arc_m)
+    let wall = profile.cast(profile.reference(), direction);
+    debug_assert!(wall.is_some(), "the wall is visible from the profile's reference point at {hour} o'clock");
+    wall.map_or(0.0, |wall| wall.arc_m)
 }
 
 #[cfg(test)]

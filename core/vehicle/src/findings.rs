@@ -63,6 +63,11 @@ const APART_M: f64 = 0.01;
 impl VehicleConfig {
     /// Returns all findings, ordered by subject: single sensors, all heads together, the tunnel.
     pub fn findings(&self) -> Vec<Finding> {
+        let [devices, configs] = [self.sensors.len(), self.sensor_configs.len()];
+        debug_assert!(
+            devices == configs,
+            "each of {devices} sensors has the common part of its table: {configs}"
+        );
         let mut found = self.connections();
         found.extend(self.remarks());
         found.extend(self.reaches());

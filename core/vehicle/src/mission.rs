@@ -68,6 +68,14 @@ impl Mission {
         }
     }
 
+    /// Whether lengths are positive, and speeds, tolerances and confidence aren't negative.
+    pub fn is_valid(&self) -> bool {
+        let Self { target_m, section_m, length_m, planned_speed_mps, coverage, .. } = self;
+        let CoverageConfig { hole_tolerance_m, contradiction_m, node_m, confidence_sd, .. } = coverage;
+        [target_m, section_m, length_m, contradiction_m, node_m].iter().all(|length_m| **length_m > 0.0)
+            && [planned_speed_mps, hole_tolerance_m, confidence_sd].iter().all(|number| **number >= 0.0)
+    }
+
     /// Whether pings land on the same wall places as in another mission.
     ///
     /// True if tunnel, water, layout and hull are the same.

@@ -22,7 +22,9 @@ impl TunnelConfig {
     pub fn from_section(section: &Section<'_>, load: Loader<'_>) -> Result<Self, ConfigError> {
         let length_m = section.number("length_m", 0.1..=1.0e5)?.unwrap_or(10_000.0);
         let shape = section.required("profile", section.choice("profile", &SHAPES)?)?;
-        let name = section.text("profile")?.unwrap_or_default();
+        let name = section.text("profile")?;
+        debug_assert!(name.is_some(), "profile {shape:?} has a name");
+        let name = name.unwrap_or_default();
         let profile = parse(section, shape, load);
         section.finish()?;
         Ok(Self { name, profile: profile?, length_m })
@@ -132,6 +134,7 @@ fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
             }
         }
     }
+    debug_assert!(points.len() == lines.len(), "{} points have a line each: {}", points.len(), lines.len());
     Ok((points, lines))
 }
 

@@ -189,7 +189,7 @@ impl VehicleConfig {
 
     /// Returns the mission parameters of this vehicle.
     pub fn mission(&self) -> Mission {
-        Mission {
+        let mission = Mission {
             profile: self.tunnel.profile.clone(),
             site: self.site,
             sound_speed_from: self.sound_speed_from.clone(),
@@ -204,7 +204,9 @@ impl VehicleConfig {
             dive_time: self.dive_time,
             alerts: self.alerts,
             limits: LimitsConfig { dive_time: self.limits.dive_time.or(self.dive_time), ..self.limits },
-        }
+        };
+        debug_assert!(mission.is_valid(), "a mission has lengths: {mission:?}");
+        mission
     }
 
     /// Returns the navigation at the start of a dive.

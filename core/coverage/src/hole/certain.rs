@@ -32,6 +32,9 @@ impl HoleFinder {
         reaches: [Option<Reach>; 2],
         needed: &Needed<'_>,
     ) -> bool {
+        let Needed { most_m, slope, .. } = *needed;
+        debug_assert!(most_m > 0.0 && most_m.is_finite(), "a circle has a radius: {most_m} m");
+        debug_assert!(slope >= 0.0, "the largest change of a radius isn't negative: {slope}");
         let Self { window, tiles, .. } = self;
         let length_m = to_m - from_m;
         let around_m = needed.most_m + length_m;

@@ -59,14 +59,20 @@ impl Share {
             return true;
         }
         let excess = |corner: (f64, f64)| nx * corner.0 + ny * corner.1 - half;
-        let Some(corners) = self.corners.get(..self.len) else { return false };
+        let Some(corners) = self.corners.get(..self.len) else {
+            debug_assert!(false, "a share has at most {MAX_CORNERS} corners: {}", self.len);
+            return false;
+        };
         if corners.iter().all(|corner| excess(*corner) <= 0.0) {
             return true;
         }
         let corners = self.corners;
         let corners = corners.iter().take(core::mem::take(&mut self.len));
         (self.farthest2, self.farthest) = (0.0, (0.0, 0.0));
-        let Some(mut before) = corners.clone().next_back() else { return true };
+        let Some(mut before) = corners.clone().next_back() else {
+            debug_assert!(false, "a share with a corner beyond the rival has corners: {:?}", self.owner);
+            return true;
+        };
         let mut excess_before = excess(*before);
         let mut fits = true;
         for corner in corners {

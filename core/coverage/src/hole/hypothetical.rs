@@ -70,8 +70,13 @@ impl HoleFinder {
         otherwise: &WallChanges,
         more: impl Iterator<Item = [f64; 2]>,
     ) {
+        self.laid_m = radius_m;
         let window = &mut self.window;
         let WallChanges { along, around, .. } = *otherwise;
+        debug_assert!(
+            along > 0.0 && around > 0.0,
+            "the wall is scaled by positive factors: {along}, {around}"
+        );
         let length_m = (to_m - from_m) * along;
         let perimeter_m = store.perimeter_m() * around;
         let reach_m = radius_m + length_m;
@@ -110,6 +115,7 @@ impl HoleFinder {
         radius_m: f64,
         otherwise: &WallChanges,
     ) -> bool {
+        debug_assert!(radius_m <= self.laid_m, "the wall is laid out for {} m: {radius_m} m", self.laid_m);
         let Self { window, tiles, .. } = self;
         let (length_m, perimeter_m) = ((to_m - from_m) * otherwise.along, window.perimeter_m());
         tiles.clear();

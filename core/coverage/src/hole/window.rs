@@ -146,12 +146,27 @@ impl Window {
         self.spots.clear();
         self.spots.resize(self.unsorted.len(), Spot::default());
         for (cell, spot) in &self.unsorted {
-            let Some(next) = self.begins.get_mut(*cell as usize + 1) else { continue };
+            let Some(next) = self.begins.get_mut(*cell as usize + 1) else {
+                debug_assert!(false, "cell {cell} is one of {} x {}", self.rows, self.columns);
+                continue;
+            };
             if let Some(place) = self.spots.get_mut(*next as usize) {
                 *place = *spot;
             }
             *next += 1;
         }
+        debug_assert!(
+            self.is_sorted(),
+            "{} samples lie in {} x {} cells",
+            self.spots.len(),
+            self.rows,
+            self.columns
+        );
+    }
+
+    /// Whether the last cell ends with the last sample, which is so if all samples lie in cells.
+    fn is_sorted(&self) -> bool {
+        self.begins.iter().rev().take(2).all(|end| *end as usize == self.spots.len())
     }
 
     /// Converts chainage from the window's origin to chainage along the tunnel, m.
@@ -238,7 +253,10 @@ impl Window {
 
     /// Returns the samples of a range of cells in a row.
     fn spots(&self, from: usize, to: usize) -> &[Spot] {
-        let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return &[] };
+        let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else {
+            debug_assert!(false, "cells {from} to {to} are among {} x {}", self.rows, self.columns);
+            return &[];
+        };
         self.spots.get(*begin as usize..*end as usize).unwrap_or_default()
     }
 

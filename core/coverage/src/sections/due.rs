@@ -53,7 +53,10 @@ impl Sections {
         let ask_for = Request::at(outlook);
         for range in [&moved.left_behind, &moved.left_ahead] {
             for index in clamp(range.clone(), &way) {
-                let Some(section) = self.get_mut(index) else { continue };
+                let Some(section) = self.get_mut(index) else {
+                    debug_assert!(false, "section {index} of {way:?} exists");
+                    continue;
+                };
                 if section.stale || section.hole.is_none() || section.not_inspected {
                     section.stale = false;
                     section.settled = false;
@@ -108,7 +111,10 @@ impl Sections {
         let Some(zone) = outlook.still_zone.clone() else { return };
         let ask_for = Request::at(outlook);
         for index in clamp(zone, &self.sections_of(outlook.way)) {
-            let Some(section) = self.get_mut(index) else { continue };
+            let Some(section) = self.get_mut(index) else {
+                debug_assert!(false, "section {index} of the coverage extent exists");
+                continue;
+            };
             let is_flagged = section.is_flagged();
             if !is_flagged || core::mem::take(&mut section.stale) {
                 ask(Request { only_fails: !is_flagged, ..ask_for(index) });
@@ -144,7 +150,10 @@ impl Sections {
     pub fn unsettled(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
         let ask_for = Request::at(outlook);
         for index in self.sections_of(outlook.way) {
-            let Some(section) = self.get_mut(index) else { continue };
+            let Some(section) = self.get_mut(index) else {
+                debug_assert!(false, "section {index} of the coverage extent exists");
+                continue;
+            };
             // Samples too far away to change a pass may have reduced the hole of a failed section.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;

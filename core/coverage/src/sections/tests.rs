@@ -74,7 +74,7 @@ fn hole(diameter_m: f64) -> Hole {
 
 #[test]
 fn section_without_samples_never_passes() {
-    let hole = Hole { bounded: false, ..hole(2.0 * FARTHEST_M) };
+    let hole = Hole { bounded: false, most_m: f64::INFINITY, ..hole(2.0 * FARTHEST_M) };
     assert_eq!(verdict(&hole, 0.0, 100.0, BEHIND), Verdict::Fail);
     assert_eq!(verdict(&hole, 0.0, 100.0, 1.0), Verdict::Open);
 }

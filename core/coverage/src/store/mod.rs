@@ -204,6 +204,12 @@ impl SampleStore {
 
     /// Returns the current contents and memory use.
     pub fn usage(&self) -> StoreUse {
+        debug_assert!(
+            self.in_bricks() == self.kept,
+            "bricks hold {} kept samples: {}",
+            self.kept,
+            self.in_bricks()
+        );
         StoreUse {
             kept: self.kept,
             thinned: self.thinned,
@@ -222,6 +228,10 @@ impl SampleStore {
         let arc_m = math::wrap(sample.arc_m, self.layout.perimeter_m);
         let number = self.brick_of(row);
         let slot = self.opened(number, true).ok_or(StoreError::Full)?;
+        debug_assert!(
+            self.open.holds(slot, number),
+            "slot {slot} holds brick {number}, which it was opened for"
+        );
         let cell = self.cell_at(slot, row, self.column(arc_m));
         if let Some(tier) =
             thinning::stands_for(&self.open, cell, (sample.x_m, arc_m), sample.step_m, self.edge_m())
@@ -237,7 +247,12 @@ impl SampleStore {
             return Err(StoreError::Full);
         }
         self.make_room(number, 1);
+        debug_assert!(
+            (0.0..self.layout.perimeter_m).contains(&arc_m),
+            "an arc length is on the wall: {arc_m} m"
+        );
         let step_m = sample.step_m.unwrap_or_default();
+        debug_assert!(step_m.iter().all(|step| step.is_finite()), "a step has a length: {step_m:?} m");
         let packed = Packed { x_m: sample.x_m, arc_m, step_m, visit: sample.visit };
         if !self.open.add(cell, sample.head, &packed) {
             return Err(StoreError::Full);
@@ -249,6 +264,12 @@ impl SampleStore {
             brick.count += 1;
         }
         self.kept += 1;
+        debug_assert!(
+            self.open.used() as u64 <= self.kept,
+            "open samples are kept: {} of {}",
+            self.open.used(),
+            self.kept
+        );
         Ok(Kept::Stored)
     }
 
@@ -289,7 +310,10 @@ impl SampleStore {
     pub fn fidelity(&self, from_m: f64, to_m: f64) -> Fidelity {
         let mut worst = Fidelity::default();
         for number in self.bricks_between(from_m, to_m) {
-            let Some(brick) = self.bricks.get(number as usize) else { continue };
+            let Some(brick) = self.bricks.get(number as usize) else {
+                debug_assert!(false, "brick {number} is one of {}", self.bricks.len());
+                continue;
+            };
             worst.thinned_m = worst.thinned_m.max(thinning::delta_m(brick.tier, self.edge_m()));
             if brick.moved {
                 worst.moved_m = packed::MOVED_M;
@@ -302,6 +326,11 @@ impl SampleStore {
         // Packing may have moved a sample near the edge of a brick beyond this edge.
         self.brick_of(self.row_near(from_m - packed::MOVED_M))
             ..=self.brick_of(self.row_near(to_m + packed::MOVED_M))
+    }
+
+    /// Number of samples in all bricks, open or packed.
+    fn in_bricks(&self) -> u64 {
+        self.bricks.iter().map(|brick| u64::from(brick.count)).sum()
     }
 
     fn packed_samples(&self, number: u32, brick: &Brick) -> Reader<'_> {
@@ -343,8 +372,13 @@ impl SampleStore {
         let layout = self.layout;
         let first_row = i64::from(number) << rows_shift;
         let reader = Reader::new(&self.arena, self.lattice(number), brick.first_block, brick.count);
+        let used = self.open.used();
         for (head, sample) in reader {
             let row = math::floor_to_i64((sample.x_m - layout.from_m) / layout.cell_m) - first_row;
+            debug_assert!(
+                (-1..=1 << rows_shift).contains(&row) && (0.0..layout.perimeter_m).contains(&sample.arc_m),
+                "a packed sample stays in brick {number}, except for rounding: {sample:?}"
+            );
             let row = row.clamp(0, (1 << rows_shift) - 1);
             let column = math::floor_to_i64(sample.arc_m / column_m).clamp(0, columns - 1);
             let at = CellAt {
@@ -354,6 +388,12 @@ impl SampleStore {
             };
             self.open.add(at, head, &sample);
         }
+        let unpacked = self.open.used() - used;
+        debug_assert!(
+            unpacked == brick.count as usize,
+            "brick {number} has {} samples: {unpacked}",
+            brick.count
+        );
     }
 
     /// Packs the bricks farthest from `number` until there is room for `samples`.
@@ -365,6 +405,7 @@ impl SampleStore {
         let (slot, far) = self.open.farthest_from(number)?;
         let lattice = self.lattice(far);
         let mut writer = Writer::new(&mut self.arena, lattice);
+        let mut written = 0;
         for head in 0..MAX_HEADS {
             let mut samples = self.open.of_head(slot, head).peekable();
             if samples.peek().is_some() {
@@ -372,11 +413,13 @@ impl SampleStore {
             }
             for node in samples {
                 writer.sample(node.sample())?;
+                written += 1;
             }
         }
         let first_block = writer.finish();
         self.open.clear(slot);
         let brick = self.bricks.get_mut(far as usize)?;
+        debug_assert!(written == brick.count, "the heads' chains have {} samples: {written}", brick.count);
         (brick.first_block, brick.slot, brick.moved) = (first_block, 0, brick.moved || brick.count > 0);
         Some(slot)
     }

@@ -123,15 +123,28 @@ impl OpenBricks {
     /// Assigns a slot to a brick without samples.
     pub(super) fn place(&mut self, slot: usize, brick: u32) {
         if let Some(held) = self.bricks.get_mut(slot) {
+            debug_assert!(held.is_none(), "slot {slot} is empty before it holds brick {brick}: {held:?}");
             *held = Some(brick);
         }
+    }
+
+    /// Whether a slot holds this brick.
+    pub(super) fn holds(&self, slot: usize, brick: u32) -> bool {
+        self.bricks.get(slot) == Some(&Some(brick))
     }
 
     /// Adds a sample of a head to a cell of a slot; returns false if there is no room.
     pub(super) fn add(&mut self, at: CellAt, head: usize, sample: &Packed) -> bool {
         let Packed { x_m, arc_m, step_m, visit } = *sample;
         let index = self.index(at);
-        let Some(list) = self.cells.get_mut(index) else { return false };
+        debug_assert!(
+            at.row < self.rows && at.column < self.columns,
+            "a sample is in a cell of a brick: {at:?}"
+        );
+        let Some(list) = self.cells.get_mut(index) else {
+            debug_assert!(false, "cell {index} is one of {}", self.cells.len());
+            return false;
+        };
         let node = Node { x_m, arc_m, step_m, visit, next_in_cell: list.latest, next_of_head: 0 };
         let link = self.free;
         let link =
@@ -199,13 +212,16 @@ impl OpenBricks {
         let Self { cells, nodes, free, used, .. } = self;
         for list in cells.iter_mut().skip(slot * per_brick).take(per_brick) {
             let mut link = list.latest;
+            let mut freed = 0;
             while let Some(node) = link.checked_sub(1).and_then(|index| nodes.get_mut(index as usize)) {
                 let next = node.next_in_cell;
                 node.next_in_cell = *free;
                 *free = link;
                 *used -= 1;
+                freed += 1;
                 link = next;
             }
+            debug_assert!(freed == list.count, "a cell's list has {} samples: {freed}", list.count);
             *list = Cell::default();
         }
         self.rows_seen.iter_mut().skip(slot * self.columns).take(self.columns).for_each(|rows| *rows = 0);

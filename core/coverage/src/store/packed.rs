@@ -173,7 +173,10 @@ impl Arena {
         let free = self.free;
         let mut released = 0;
         while link != 0 {
-            let Some(next) = self.block_mut(link).and_then(|block| block.last_mut()) else { break };
+            let Some(next) = self.block_mut(link).and_then(|block| block.last_mut()) else {
+                debug_assert!(false, "block {link} of a brick is one of {}", self.blocks.len());
+                break;
+            };
             released += 1;
             let after = *next;
             if after == 0 {

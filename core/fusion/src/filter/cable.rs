@@ -156,6 +156,8 @@ impl Cable {
     /// Processes a reading and decides what to do with it.
     pub fn take(&mut self, reading: &CableReading) -> Use {
         let before = self.last.replace(*reading);
+        let is_later = before.is_none_or(|before| before.at <= reading.at);
+        debug_assert!(is_later, "cable readings are in order of time: {reading:?} after {before:?}");
         if let Some(dispute) = &mut self.dispute {
             let used = dispute.take(reading);
             if used != Use::Withhold {

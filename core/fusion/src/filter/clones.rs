@@ -100,6 +100,10 @@ impl ErrorClones {
         let is_enough = |newest: &Moment| {
             at.since(newest.at).0 < STEP.0 && !newest.is_unsure_beside(factors.variance(POSITION))
         };
+        debug_assert!(
+            self.newest().is_none_or(|newest| newest.at <= at),
+            "clones are in order of time: {at:?}"
+        );
         if self.newest().is_some_and(is_enough) {
             return;
         }
@@ -112,6 +116,8 @@ impl ErrorClones {
         }
         self.count += 1;
         self.since = identity();
+        let kept = self.clones.len();
+        debug_assert!(kept == self.count.min(CLONES), "{} clones fill {kept} of {CLONES} places", self.count);
         self.compare();
     }
 
@@ -133,6 +139,7 @@ impl ErrorClones {
                     return Some(clone.relative);
                 }
                 let share = (wanted_s - newer_s) / (age_s - newer_s);
+                debug_assert!((0.0..=1.0).contains(&share), "{wanted_s} s is from {newer_s} to {age_s} s");
                 return Some(newer.weighted(1.0 - share, &clone.relative, share));
             }
             (newer_s, newer, newer_m2) = (age_s, clone.relative, clone.chainage_m2());
@@ -146,13 +153,19 @@ impl ErrorClones {
     /// It goes back through the clones and updates the matrix that maps a clone's errors to those of the newest
     /// clone.
     fn compare(&mut self) {
-        let Some(now) = self.newest().copied() else { return };
+        let Some(now) = self.newest().copied() else {
+            debug_assert!(false, "there is a clone to compare with: {} so far", self.count);
+            return;
+        };
         let mut depends = MOVING.map(|i| core::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
         let mut since = now.since_last;
         for back in 1..self.clones.len() {
             depends = depends.map(|row| product(&row, &since));
             let number = (self.count - 1 - back) % CLONES;
-            let Some(clone) = self.clones.get_mut(number) else { return };
+            let Some(clone) = self.clones.get_mut(number) else {
+                debug_assert!(false, "clone {number} is one of {CLONES}");
+                return;
+            };
             clone.relative = against(&now.rows, &clone.rows, &depends);
             since = clone.since_last;
         }

@@ -70,6 +70,7 @@ impl CounterCorrections {
 
     /// Advances by the time since the previous reading, s; `is_same` means that the count has not changed.
     pub fn pass(&mut self, dt_s: f64, is_same: bool) {
+        debug_assert!(dt_s >= 0.0, "cable readings are in order of time: {dt_s} s apart");
         self.lost_m *= math::exp(-dt_s / PASSES_S);
         self.recent = self.recent.map(|sum| sum * math::exp(-dt_s / RECENT_S));
         if is_same {
@@ -96,6 +97,7 @@ impl CounterCorrections {
             self.fade(dt_s / PASSES_S);
         }
         self.lost_m = self.lost_m.max(self.lacks_m);
+        debug_assert!(self.lacks_m >= 0.0, "a standard deviation isn't negative: {} m", self.lacks_m);
     }
 
     fn fade(&mut self, times: f64) {
@@ -116,6 +118,7 @@ impl CounterCorrections {
 
     /// Returns the standard deviation of the possible loss between passes, m.
     pub fn lost_m(&self) -> f64 {
+        debug_assert!(self.lost_m >= 0.0, "a standard deviation isn't negative: {} m", self.lost_m);
         self.lost_m
     }
 

@@ -169,7 +169,10 @@ impl DistanceComparison {
             let windows = WINDOWS_S.into_iter();
             let differs_m = windows.filter_map(|window_s| self.differs_m(other, window_s, settings));
             let differs_m = differs_m.fold(0.0, f64::max);
-            let Some(since) = self.since.get_mut(k) else { continue };
+            let Some(since) = self.since.get_mut(k) else {
+                debug_assert!(false, "comparison {k} is one of {}", self.since.len());
+                continue;
+            };
             if differs_m <= 0.0 {
                 *since = None;
                 continue;

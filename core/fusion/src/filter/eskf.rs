@@ -180,6 +180,7 @@ impl Eskf {
     /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
     /// about the errors between later passes.
     fn settle(&mut self) {
+        debug_assert!(self.factors.has_variances(), "variances aren't negative: {:?}", self.factors);
         let (begun, yaw_rad) = self.begun;
         let now_rad = self.pose_sd().yaw_rad;
         let is_settling = self.at.since(begun).0 <= SETTLES_WITHIN.0 && yaw_rad > SETTLED_RAD;
@@ -280,7 +281,12 @@ impl Eskf {
 
     /// Records a step that begins with the current estimate.
     fn keep(&mut self, to: MonoNs, by: &Move, predicted: State) {
-        if self.keeps_steps && self.steps.len() < STEPS {
+        let kept = self.steps.len();
+        debug_assert!(
+            !self.keeps_steps || kept < STEPS,
+            "an epoch has at most {STEPS} steps: {kept} before this"
+        );
+        if self.keeps_steps && kept < STEPS {
             let (at, state, factors) = (self.at, self.state, self.factors);
             self.steps.push(Step { at, to, state, factors, by: *by, predicted });
         }
@@ -314,6 +320,7 @@ impl Eskf {
     }
 
     fn propagate(&mut self, to: MonoNs, context: &Context, window: &Window) -> (State, Leg) {
+        debug_assert!(to >= self.at, "an epoch from {:?} ends later: {to:?}", self.at);
         let mut leg = Leg::default();
         let (mut now, mut state) = (self.at, self.state);
         self.knots.clear();
@@ -333,6 +340,7 @@ impl Eskf {
 
     /// Returns the estimate at a time within the last epoch, before the measurements of the epoch.
     fn state_at(&self, at: MonoNs) -> State {
+        debug_assert!(at > self.at, "earlier readings than {:?} are fused: {at:?}", self.at);
         let next = self.knots.partition_point(|(knot, _)| *knot < at);
         let (before, after) = (self.knots.get(next.saturating_sub(1)), self.knots.get(next));
         let (Some((from, before)), Some((to, after))) = (before, after) else {
@@ -559,6 +567,7 @@ impl Eskf {
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {
+        debug_assert!((0.0..=1.0).contains(&share), "the applied part of a correction is a share: {share}");
         let mut gain = self.factors.measure(&row.h, row.noise);
         let mut left_out = [0.0; ERRORS];
         for i in (ATTITUDE..ATTITUDE + 3).chain(RATE_BIAS..RATE_BIAS + 3).chain([HEADING]) {

@@ -50,6 +50,7 @@ impl<const N: usize> Stateful for Factors<N> {
 impl<const N: usize> Factors<N> {
     /// Creates factors of independent errors with these variances, which must not be negative.
     pub fn independent(variances: [f64; N]) -> Self {
+        debug_assert!(variances.iter().all(is_variance), "variances aren't negative: {variances:?}");
         let mut u = [[0.0; N]; N];
         for (j, column) in u.iter_mut().enumerate() {
             if let Some(diagonal) = column.get_mut(j) {
@@ -148,7 +149,10 @@ impl<const N: usize> Factors<N> {
         let mut sum = Self::independent([0.0; N]);
         for (j, (column, d)) in sum.u.iter_mut().zip(&mut sum.d).enumerate().rev() {
             let (above, from) = w.split_at_mut(j);
-            let Some(own) = from.first() else { continue };
+            let Some(own) = from.first() else {
+                debug_assert!(false, "row {j} is one of {N}");
+                continue;
+            };
             let weighted: [[f64; N]; M] = core::array::from_fn(|m| {
                 let weights = parts.get(m).map_or([0.0; N], |(factors, _)| factors.d);
                 let own = own.get(m).copied().unwrap_or([0.0; N]);
@@ -195,6 +199,7 @@ impl<const N: usize> Factors<N> {
     ///
     /// Source: Bierman 1977, V.3.
     pub fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N> {
+        debug_assert!(noise > 0.0, "a measurement has noise: its variance is {noise}");
         let mut k = [0.0; N];
         let mut variance = noise;
         for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate() {
@@ -213,11 +218,16 @@ impl<const N: usize> Factors<N> {
                 *k = g;
             }
         }
+        debug_assert!(
+            is_variance(&(variance - noise)),
+            "the variance of an innovation includes the noise of {noise}: {variance}"
+        );
         Gain { k: k.map(|k| k / variance), variance }
     }
 
     /// Adds noise with this variance to all errors, weighted by `a`. Entries of `a` from `len` on are zero.
     pub fn add(&mut self, mut variance: f64, mut a: [f64; N], len: usize) {
+        debug_assert!(is_variance(&variance), "added noise has a variance: {variance}");
         for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().take(len).rev() {
             enter(j, column, d, &mut variance, &mut a);
         }
@@ -242,6 +252,7 @@ impl<const N: usize> Factors<N> {
     /// its next column needs, the processor works on the other noises.
     pub fn add_all<const M: usize>(&mut self, noises: [Noise; M]) {
         let mut variances = noises.map(|noise| noise.variance);
+        debug_assert!(variances.iter().all(is_variance), "added noises have variances: {variances:?}");
         let lens = noises.map(|noise| noise.weights[0].0 + 1);
         let mut a = [[0.0; N]; M];
         for (a, noise) in a.iter_mut().zip(&noises) {
@@ -267,6 +278,7 @@ impl<const N: usize> Factors<N> {
 
     /// Multiplies one error by a non-zero factor.
     pub fn scale(&mut self, i: usize, factor: f64) {
+        debug_assert!(factor.abs() > 0.0, "the factor of error {i} isn't zero: {factor}");
         if let Some(column) = self.u.get_mut(i) {
             for u in column.iter_mut().take(i) {
                 *u /= factor;
@@ -280,6 +292,13 @@ impl<const N: usize> Factors<N> {
         if let Some(d) = self.d.get_mut(i) {
             *d *= factor * factor;
         }
+    }
+
+    /// Whether no variance is negative.
+    ///
+    /// True for any sequence of changes. Numbers that are no longer finite pass; [`Self::is_sound`] detects them.
+    pub fn has_variances(&self) -> bool {
+        self.d.iter().all(is_variance)
     }
 
     /// Whether all numbers are finite and no variance is negative.
@@ -332,6 +351,12 @@ fn enter<const N: usize>(j: usize, column: &mut [f64; N], d: &mut f64, variance:
         }
     }
     *d = sum;
+}
+
+/// Whether a number may be a variance: it isn't negative, or it is no number.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "iterators pass references")]
+fn is_variance(number: &f64) -> bool {
+    *number >= 0.0 || number.is_nan()
 }
 
 fn at<const N: usize>(column: &[f64; N], i: usize) -> f64 {

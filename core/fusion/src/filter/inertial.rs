@@ -89,6 +89,7 @@ impl State {
         dt_s: f64,
         gravity_mps2: f64,
     ) -> (Matrix3<f64>, Option<Vector3<f64>>) {
+        debug_assert!(dt_s >= 0.0, "an estimate is propagated forwards in time: {dt_s} s");
         let half = felt.rate_radps.map(|rate| rotation((rate + -self.rate_bias_radps).scaled(dt_s / 2.0)));
         let middle = half.map_or(self.attitude, |half| self.attitude * half);
         let turn = matrix(middle);
@@ -184,6 +185,11 @@ impl Leg {
     /// `unrest` contains the factors by which the process noise of gyro and accelerometer biases is multiplied.
     #[must_use]
     pub fn with_noise(self, unrest: [f64; 2], slack: GaussMarkov) -> Self {
+        debug_assert!(unrest.iter().all(|factor| *factor >= 1.0), "noise is only raised: {unrest:?}");
+        debug_assert!(
+            slack.reach > 0.0 && slack.time_s > 0.0,
+            "slack has a size and a time constant: {slack:?}"
+        );
         Self { unrest, slack: [slack.reach, slack.time_s], ..self }
     }
 

@@ -144,6 +144,7 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     if cosine < LEAST_COSINE {
         return None;
     }
+    debug_assert!(cosine <= 1.0 + 1e-5, "beam {along:?} and normal {normal:?} are unit vectors");
     // The wall is modelled as a plane at `height_m`. The ray of the cone that is nearest to the plane's normal
     // echoes first.
     let height_m = hit.range_m * cosine;

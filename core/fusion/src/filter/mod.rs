@@ -179,6 +179,7 @@ impl FilterNavigation {
             let heard =
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
             let to = due.max(heard).min(last);
+            debug_assert!(to > self.running.at, "an epoch from {:?} ends later: {to:?}", self.running.at);
             let is_silent = to.since(self.running.at).0 > SILENCE.0;
             self.running.is_at_rest = self.stillness.is_still() && self.dispute().is_none();
             self.running.advance(to, &self.context, &mut self.window, &mut self.sources);
@@ -243,6 +244,7 @@ impl FilterNavigation {
             self.begin_anew(sd.along_m);
             return;
         }
+        debug_assert!(sd.is_valid(), "standard deviations of a sound estimate are numbers: {sd:?}");
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
         // At first, errors of new soundings are independent of errors of earlier soundings.
@@ -326,7 +328,10 @@ impl FilterNavigation {
     /// Adds a reading to the window, unless recent readings of the same source make it redundant.
     fn take(&mut self, number: usize, at: MonoNs, reading: &Reading) {
         let step_rad = self.context.settings.return_step_rad;
-        let Some(Some(source)) = self.sources.get_mut(number) else { return };
+        let Some(Some(source)) = self.sources.get_mut(number) else {
+            debug_assert!(false, "source {number}, which has a reading, is known");
+            return;
+        };
         let mount = source.sensor.mount;
         let wanted = match (source.sensor.kind, reading) {
             (SensorKind::Head, Reading::Sonar(sonar)) => source.turning.ping(at, sonar, step_rad),
@@ -388,7 +393,10 @@ impl Navigation for FilterNavigation {
         }
         self.received = self.received.max(times.received);
         self.close_epochs(self.received - self.context.settings.window);
-        let Some(slot) = self.sources.get_mut(number) else { return };
+        let Some(slot) = self.sources.get_mut(number) else {
+            debug_assert!(false, "source {number} is one of {MAX_SOURCES}");
+            return;
+        };
         let source = slot.get_or_insert_with(|| Source::new(*sensor));
         if !reading.is_finite() || times.valid.since(times.received) > CLOCK_JUMP {
             source.consistency.dropped += 1;
@@ -491,6 +499,7 @@ impl Navigation for FilterNavigation {
         }
         let arm = state.attitude * -self.context.unit_at;
         let pose = Pose { position: state.position + arm, attitude: state.attitude };
+        debug_assert!(pose.position.is_finite() && pose.attitude.is_unit(), "a fix has a pose: {pose:?}");
         let (speed_mps, tie) = (state.velocity_mps.x(), self.running.ties);
         let settled = self.running.settled;
         let [relative, revisit] = [relative, self.revisit].map(|of| of.moved(arm));

@@ -46,6 +46,12 @@ impl PoseSd {
         }
     }
 
+    /// Whether no standard deviation is negative, and all are numbers.
+    pub fn is_valid(&self) -> bool {
+        let Self { along_m, place_m, tilt_rad, yaw_rad } = *self;
+        [along_m, place_m, tilt_rad, yaw_rad].iter().all(|sd| *sd >= 0.0)
+    }
+
     /// Returns the covariance relative to an independent estimate with the same uncertainty.
     pub fn independent(&self) -> Relative {
         let variance = |sd: f64| 2.0 * sd * sd;

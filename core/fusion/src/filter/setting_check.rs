@@ -317,7 +317,10 @@ impl SettingChecks {
                     own.mount.rotation * (round() * (own.mount.rotation.inverse() * look.beam.along));
             }
             let Some(row) = expect(state, design, &look) else { continue };
-            let Ok(source) = u16::try_from(waiting.source) else { continue };
+            let Ok(source) = u16::try_from(waiting.source) else {
+                debug_assert!(false, "source {}, which is followed, has a short number", waiting.source);
+                continue;
+            };
             let is_echo = own.kind != SensorKind::Head;
             note(&mut self.alternatives, (source, *other, is_echo), [missed_m, row.residual]);
         }
@@ -421,7 +424,9 @@ impl SettingChecks {
 }
 
 fn info(sources: &[Option<Source>], number: usize) -> Option<&SensorInfo> {
-    sources.get(number)?.as_ref().map(|source| &source.sensor)
+    let source = sources.get(number)?.as_ref();
+    debug_assert!(source.is_some(), "source {number}, which has readings, is known");
+    source.map(|source| &source.sensor)
 }
 
 /// Returns the axes about which a mount is pitched and yawed, in the body frame.

@@ -140,7 +140,10 @@ impl SlackEstimate {
     ///
     /// Allocates: never.
     pub(super) fn go_on(&mut self, felt: &InertialSample, until: MonoNs, about: &State, gravity_mps2: f64) {
-        let Some((from, _)) = self.knots.last().copied() else { return };
+        let Some((from, _)) = self.knots.last().copied() else {
+            debug_assert!(false, "an epoch that ends at {until:?} has begun");
+            return;
+        };
         let dt_s = until.since(from).as_secs_f64();
         let (Some(rate), Some(force)) = (felt.rate_radps, felt.force_mps2) else {
             self.differences.clear();
@@ -238,6 +241,7 @@ impl SlackEstimate {
         let most_m2 = MOST_SDS * MOST_SDS * square_m2.max(1e-4);
         let counted_m2 = if *seen > 20 { (off_m * off_m).min(most_m2) } else { off_m * off_m };
         *square_m2 += share * (counted_m2 - *square_m2);
+        debug_assert!(*square_m2 >= 0.0, "a mean square isn't negative: {square_m2} m2");
         agrees
     }
 

@@ -93,6 +93,7 @@ impl State {
         self.position = self.position + vec(errors, POSITION);
         self.velocity_mps = self.velocity_mps + vec(errors, VELOCITY);
         self.attitude = rotation(vec(errors, ATTITUDE)) * self.attitude;
+        debug_assert!(self.attitude.is_unit(), "an attitude is a unit quaternion: {:?}", self.attitude);
         self.force_bias_mps2 = self.force_bias_mps2 + vec(errors, FORCE_BIAS);
         self.rate_bias_radps = self.rate_bias_radps + vec(errors, RATE_BIAS);
         let [creep_m, slack_m, slack_rate_mps, scale, depth_m, heading_rad, range_scale] =

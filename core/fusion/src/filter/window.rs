@@ -153,6 +153,12 @@ impl Window {
     /// Removes and returns the first reading, if it is valid at or before `until`.
     pub fn pop(&mut self, until: MonoNs) -> Option<Waiting> {
         let first = self.waiting.first()?;
+        let is_first = self.waiting.get(1).is_none_or(|next| first.at <= next.at);
+        debug_assert!(
+            is_first,
+            "readings wait in order of validity: source {} at {:?}",
+            first.source, first.at
+        );
         (first.at <= until).then(|| self.waiting.remove(0))
     }
 

@@ -83,7 +83,16 @@ impl Track {
             piece.points = turned(&piece.points, points.len());
             piece.relatives = turned(&piece.relatives, relatives.len());
         }
-        Self { pieces, points, relatives, epoch }
+        let track = Self { pieces, points, relatives, epoch };
+        debug_assert!(track.is_divided(), "pieces divide {} points: {:?}", track.points.len(), track.pieces);
+        track
+    }
+
+    /// Whether each point belongs to one piece, in order.
+    fn is_divided(&self) -> bool {
+        let begins = self.pieces.iter().map(|piece| piece.points.start).chain([self.points.len()]);
+        let ends = [0].into_iter().chain(self.pieces.iter().map(|piece| piece.points.end));
+        begins.eq(ends)
     }
 
     /// Number of pieces, which is one more than the number of breaks.
@@ -132,12 +141,16 @@ impl Track {
     }
 
     fn points_of(&self, piece: &Piece) -> &[Point] {
-        self.points.get(piece.points.clone()).unwrap_or_default()
+        let points = self.points.get(piece.points.clone());
+        debug_assert!(points.is_some(), "{piece:?} has some of {} points", self.points.len());
+        points.unwrap_or_default()
     }
 
     /// Covariance relative to the previous pass of the heads, interpolated linearly in time.
     fn relative(&self, piece: &Piece, at: MonoNs) -> Relative {
-        let known = self.relatives.get(piece.relatives.clone()).unwrap_or_default();
+        let known = self.relatives.get(piece.relatives.clone());
+        debug_assert!(known.is_some(), "{piece:?} has some of {} covariances", self.relatives.len());
+        let known = known.unwrap_or_default();
         let next = known.partition_point(|(moment, _)| *moment <= at);
         match (next.checked_sub(1).and_then(|before| known.get(before)), known.get(next)) {
             (Some((from, before)), Some((to, after))) => {

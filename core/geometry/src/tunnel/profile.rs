@@ -150,6 +150,10 @@ impl Profile {
         let mut profile = Self { elements, tree, support, perimeter_m, reference, places: Vec::new() };
         let place = |k: u32| profile.point_at(perimeter_m * f64::from(k) / f64::from(PLACES));
         profile.places = (0..PLACES).map(place).collect();
+        debug_assert!(
+            perimeter_m > 0.0 && perimeter_m.is_finite(),
+            "a perimeter is a length: {perimeter_m} m"
+        );
         Ok(profile)
     }
 
@@ -295,6 +299,7 @@ impl Profile {
             best.map_or(f64::INFINITY, |(shortest, _)| shortest)
         });
         let (t, index) = best.or_else(|| self.nearest_vertex(origin, direction))?;
+        debug_assert!(t >= 0.0, "a ray from {origin:?} along {direction:?} leaves the profile ahead: {t}");
         let element = self.elements.get(index)?;
         let point = [origin[0] + t * direction[0], origin[1] + t * direction[1]];
         let along = element.along(point).clamp(0.0, element.length_m);

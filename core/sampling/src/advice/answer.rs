@@ -67,7 +67,9 @@ impl ModeName {
 
     /// The name.
     pub fn as_str(&self) -> &str {
-        self.bytes.get(..self.len.into()).and_then(|name| core::str::from_utf8(name).ok()).unwrap_or_default()
+        let name = self.bytes.get(..self.len.into()).and_then(|name| core::str::from_utf8(name).ok());
+        debug_assert!(name.is_some(), "a mode's name is UTF-8: {} of {:?}", self.len, self.bytes);
+        name.unwrap_or_default()
     }
 }
 
@@ -214,6 +216,19 @@ pub struct Advice {
 }
 
 impl Advice {
+    /// Whether the figures agree with each other.
+    ///
+    /// Speeds and times are finite and not negative. There is a speed exactly if a lower speed helps, and the advised
+    /// interval ends at this speed.
+    pub fn is_consistent(&self) -> bool {
+        let figures = [self.v_max_mps, self.sure_m, self.pass_gap_s, self.even_pass_gap_s, self.t_y_m];
+        let is_figure = |figure: f64| figure >= 0.0 && figure.is_finite();
+        figures.into_iter().chain(self.nearest_mps).chain(self.predicted_t_m).all(is_figure)
+            && (0.0..=self.v_max_mps).contains(&self.from_mps)
+            && (self.v_max_mps > 0.0) == (self.reason == Reason::HelixPitch)
+            && (0.0..=1.0).contains(&self.lost_share)
+    }
+
     pub(super) fn nothing(reason: Reason) -> Self {
         Self {
             v_max_mps: 0.0,

@@ -118,6 +118,10 @@ impl Hysteresis {
             Some((_, least_mps)) => least_mps,
             None => before_mps,
         };
+        debug_assert!(
+            speed_mps >= shown_mps * (1.0 - FALLS_BY),
+            "the displayed speed exceeds the advised {speed_mps} m/s by at most the share {FALLS_BY}: {shown_mps} m/s"
+        );
         if risen.is_some() {
             self.rising = None;
         }

@@ -90,7 +90,10 @@ impl AdvisedHead {
     /// Updates the view: the wall within the head's sector, the hidden wall, and the wall outside the range limits.
     pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
-        let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };
+        let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else {
+            debug_assert!(false, "a head whose ring was just cast is inside the profile: {pose:?}");
+            return;
+        };
         view.sector = self.sector.and_then(|angles| Sector::of(&standing, &angles).ok());
         view.hidden.extend(self.hidden.iter().filter_map(|angles| Arc::of(&standing, angles).ok()));
         view.hide_out_of_reach(&self.ring, self.spec.reach_m(sound_speed_mps));

@@ -169,7 +169,10 @@ impl Planner {
 
     fn hull_rules(&self, mode: usize, speed_mps: f64) -> Result<Vec<HullAdvice>, SamplingError> {
         let specs = self.specs(mode);
-        let Some(planned) = self.modes().get(mode) else { return Ok(Vec::new()) };
+        let Some(planned) = self.modes().get(mode) else {
+            debug_assert!(false, "mode {mode} of a briefing is one of {}", self.modes().len());
+            return Ok(Vec::new());
+        };
         if self.inspection().layout != HeadLayout::PhaseShift {
             return Ok(Vec::new());
         }

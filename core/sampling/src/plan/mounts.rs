@@ -70,7 +70,10 @@ fn in_line(inspection: &Inspection) -> Option<Inspection> {
     order.sort_by(|a, b| place_x(*a).total_cmp(&place_x(*b)));
     let mut last: Option<(f64, f64)> = None;
     for number in &order {
-        let Some((spec, _)) = moved.heads.get_mut(*number) else { continue };
+        let Some((spec, _)) = moved.heads.get_mut(*number) else {
+            debug_assert!(false, "head {number} is one of {}", inspection.heads.len());
+            continue;
+        };
         let long_m = spec.body.ahead_m + spec.body.behind_m;
         let own_m = place_x(*number);
         let at_m = last.map_or(own_m, |(before_m, before_long_m)| {

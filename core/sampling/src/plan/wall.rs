@@ -99,6 +99,7 @@ impl Planner {
             for ping in 0..=pings {
                 let since_s = ping as f64 * spec.ping_period_s;
                 let Some(angle_rad) = schedule.angle_rad(head, DurNs::from_secs_f64(since_s)) else {
+                    debug_assert!(false, "head {head} is scheduled from the start on: {since_s} s");
                     continue;
                 };
                 let grows = last.map(|last| math::wrap_signed(angle_rad - last, math::TAU) > 0.0);
@@ -163,7 +164,10 @@ impl Around {
             let first = math::floor_to_i64(from_m / place_m);
             let last = math::floor_to_i64((from_m + way_m.abs()) / place_m);
             for place in first..=last {
-                let Ok(place) = usize::try_from(place.rem_euclid(places as i64)) else { continue };
+                let Ok(place) = usize::try_from(place.rem_euclid(places as i64)) else {
+                    debug_assert!(false, "place {place} is one of {places} round the perimeter");
+                    continue;
+                };
                 if let (Some(t_y_m), Some(here)) = (self.t_y_m.get_mut(place), self.share.get_mut(place)) {
                     *t_y_m = t_y_m.max(step_m);
                     *here = here.or(share);

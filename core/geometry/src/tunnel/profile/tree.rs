@@ -121,6 +121,10 @@ impl Tree {
         let mut stack = [(0, 0.0); DEPTH];
         let mut waiting = 0;
         let wait = |stack: &mut [(usize, f64); DEPTH], waiting: &mut usize, node: usize, cost: f64| {
+            debug_assert!(
+                *waiting < DEPTH,
+                "a search waits for at most {DEPTH} nodes; node {node} is one more"
+            );
             if let Some(slot) = stack.get_mut(*waiting) {
                 *slot = (node, cost);
                 *waiting += 1;
