@@ -134,7 +134,6 @@ fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
             }
         }
     }
-    debug_assert!(points.len() == lines.len(), "{} points have a line each: {}", points.len(), lines.len());
     Ok((points, lines))
 }
 

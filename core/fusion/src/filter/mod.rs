@@ -393,10 +393,7 @@ impl Navigation for FilterNavigation {
         }
         self.received = self.received.max(times.received);
         self.close_epochs(self.received - self.context.settings.window);
-        let Some(slot) = self.sources.get_mut(number) else {
-            debug_assert!(false, "source {number} is one of {MAX_SOURCES}");
-            return;
-        };
+        let Some(slot) = self.sources.get_mut(number) else { return };
         let source = slot.get_or_insert_with(|| Source::new(*sensor));
         if !reading.is_finite() || times.valid.since(times.received) > CLOCK_JUMP {
             source.consistency.dropped += 1;
