@@ -2,6 +2,8 @@
 //!
 //! Advice depends on the situations alone, not on the verdicts.
 
+#![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
+
 use std::sync::Arc;
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};

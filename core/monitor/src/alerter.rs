@@ -47,7 +47,7 @@ impl Alerter {
     /// `runs` is the maximum number of runs that change in a tick. Allocates: all memory.
     pub(super) fn new(
         list: AlertList,
-        state: LiveState,
+        state: &LiveState,
         heads: Vec<SourceId>,
         runs: usize,
         keeps_results: bool,
@@ -58,7 +58,16 @@ impl Alerter {
             changes.keep();
         }
         let notices = Vec::with_capacity(runs + MAX_TICK_PACKETS + NOTICES_PER_ALERT * MOST_LISTED);
-        Self { list, notes: Notes::default(), state, without_effect: 0, states, changes, notices, heads }
+        Self {
+            list,
+            notes: Notes::default(),
+            state: *state,
+            without_effect: 0,
+            states,
+            changes,
+            notices,
+            heads,
+        }
     }
 
     /// Clears the results of the last tick from the streams.
@@ -87,7 +96,9 @@ impl Alerter {
     /// Takes the runs that a judgement at the end of a dive has changed.
     pub(super) fn take_runs_at_end(&mut self, runs: &[RunInput]) {
         self.notices.clear();
-        runs.iter().for_each(|run| self.take_run(run));
+        for run in runs {
+            self.take_run(run);
+        }
     }
 
     /// Takes the observations after the last judgement of a dive.

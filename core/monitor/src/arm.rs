@@ -80,7 +80,8 @@ impl App {
         placer.insert_state("speed of sound", sound_speed);
         let placer = Placer::new(placer, readers, keeps_results)?;
         let live = live_state(&mission, &head_sources, sources.len(), reach_m);
-        let alerter = Alerter::new(list, live, head_sources, surveyor.found().runs.capacity(), keeps_results);
+        let alerter =
+            Alerter::new(list, &live, head_sources, surveyor.found().runs.capacity(), keeps_results);
         let about = About { mission, sources, descriptions };
         Ok(Loop::new(about, Parts { placer, surveyor, adviser, alerter }, outlets, ports))
     }

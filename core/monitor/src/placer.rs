@@ -2,6 +2,8 @@
 //!
 //! Its entities are the vehicle and its sensors. No result of another part reaches it.
 
+#![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
+
 pub(super) mod decode;
 pub(super) mod georeference;
 pub(super) mod navigate;
@@ -151,7 +153,9 @@ impl Placer {
         let Self { part, readers } = self;
         part.world.resource_mut::<Poses>().0.next_tick();
         part.world.resource_mut::<Inbox>().fill(readers, allowance_bytes);
-        PlaceStage::ALL.iter().for_each(|stage| part.run(*stage));
+        for stage in PlaceStage::ALL {
+            part.run(*stage);
+        }
         self.swap_lists(into);
         self.report(into);
         debug_assert!(

@@ -2,6 +2,8 @@
 //!
 //! Its entities are the heads.
 
+#![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
+
 mod classify;
 mod count;
 mod coverage_extent;
@@ -82,7 +84,9 @@ impl Surveyor {
         part.add_systems(SurveyStage::Report, standing::report_standing);
         part.initialize()?;
         // The first run of a schedule allocates memory. Without pings it has no other effect.
-        SurveyStage::ALL.iter().for_each(|stage| part.run(*stage));
+        for stage in SurveyStage::ALL {
+            part.run(*stage);
+        }
         Ok(Self { part, nothing: Arc::default() })
     }
 
@@ -94,7 +98,9 @@ impl Surveyor {
         part.world.resource_mut::<PlacedTick>().0 = Arc::clone(placed);
         part.run(SurveyStage::Classify);
         while part.world.resource::<Cursor>().next < placed.items.len() {
-            SurveyStage::OF_STOP.into_iter().for_each(|stage| part.run(stage));
+            for stage in SurveyStage::OF_STOP {
+                part.run(stage);
+            }
         }
         part.run(SurveyStage::Surveyed);
         part.world.resource_mut::<PlacedTick>().0 = Arc::clone(nothing);

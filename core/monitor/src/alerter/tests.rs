@@ -40,7 +40,7 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
     let entry = AdviceEntry { at: AT, chainage_m: None, speed_mps: 0.07, advice: advice(&situation) };
     let advised = Advised { entries: vec![entry], ..Advised::default() };
     let list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100);
-    let mut alerter = Alerter::new(list, LiveState::new(0.5, 2.0, 0, 0), Vec::new(), 0, false);
+    let mut alerter = Alerter::new(list, &LiveState::new(0.5, 2.0, 0, 0), Vec::new(), 0, false);
     alerter.tick(&placed, &found, &advised, MonoNs(9_050_000_000));
     alerter.state
 }
@@ -117,7 +117,7 @@ impl Bench {
         let command = Command::Acknowledge { alert: 0, by: crate::console::Who::default() };
         let list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100);
         Self {
-            alerter: Alerter::new(list, LiveState::new(0.5, 2.0, 0, 3), Vec::new(), 1, false),
+            alerter: Alerter::new(list, &LiveState::new(0.5, 2.0, 0, 3), Vec::new(), 1, false),
             run,
             command: ReceivedCommand { before: command_before, at: NOW, command },
             events: (0..10).map(event).collect(),

@@ -17,7 +17,7 @@ pub(super) fn look_around(
     at: MonoNs,
     requests: &mut Requests,
 ) {
-    if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
+    if at.0.is_multiple_of(LOOK_AROUND.0.unsigned_abs()) {
         let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
         let outlook = coverage.frontier.outlook(reaches, at);
         coverage.sections.look_around(&outlook, &mut |request| requests.0.push(request));
