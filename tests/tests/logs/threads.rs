@@ -328,7 +328,7 @@ fn loops_with_different_mission_settings_cannot_share_a_navigation() {
         app.arm(scene.vehicle.navigation()).unwrap()
     };
     let mut feed = Feed { packets: Vec::new(), next: 0, end: End::Last };
-    let mut loops = [armed(first), armed(other)];
+    let mut loops = vec![armed(first), armed(other)];
     let driven = drive_together(2, &mut loops, &mut feed, DurNs::from_millis(20));
     assert!(matches!(driven, Err(DriveError::Unlike { number: 1 })), "{driven:?}");
 }
