@@ -7,7 +7,7 @@ pub(super) struct Squares(Vec<[f64; 2]>);
 
 /// The largest empty square that ends at each cell of the grid over the passed wall.
 pub(super) fn squares(dive: &Loop) -> Squares {
-    let coverage = dive.coverage();
+    let coverage = dive.view().coverage();
     let [along_m, around_m] = coverage.soundings.node_m();
     let edge_m = along_m.min(around_m);
     let way = coverage.sections.sections_of(coverage.frontier.way());

@@ -361,7 +361,7 @@ fn by_cells(dive: &JudgedDive, ended: &Loop) -> Vec<Judged> {
 
 /// Searches once for the hole of each section.
 fn search(dive: &Loop, tolerance_m: f64) {
-    let (coverage, mut finder) = (dive.coverage(), HoleFinder::new(tolerance_m));
+    let (coverage, mut finder) = (dive.view().coverage(), HoleFinder::new(tolerance_m));
     for index in coverage.sections.sections_of(coverage.frontier.way()) {
         let (from_m, to_m) = coverage.sections.bounds_m(index);
         std::hint::black_box(finder.largest(&coverage.store, from_m, to_m));

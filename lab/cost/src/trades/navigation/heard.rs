@@ -43,7 +43,7 @@ impl Hearing {
         let mut readings: Vec<Heard> = Vec::new();
         let navigation = Box::new(CableNavigation::new(&vehicle.tunnel.profile));
         let dive = recorded.judged_with(vehicle, navigation, &mut |dive| {
-            readings.extend(dive.readings().iter().map(|event| Heard {
+            readings.extend(dive.view().readings().iter().map(|event| Heard {
                 source: event.source.index(),
                 times: Times { received: event.received, valid: event.valid_at },
                 reading: event.reading,
