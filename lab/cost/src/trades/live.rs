@@ -283,7 +283,7 @@ impl Ran {
         let mut feed = recorded.packets.feed();
         let (mut v_max_mps, mut ticks_s) = (Vec::new(), Vec::new());
         let mut note = |dive: &Loop| {
-            v_max_mps.extend(dive.advised().entries.iter().map(|entry| entry.advice.v_max_mps));
+            v_max_mps.extend(dive.view().advised().entries.iter().map(|entry| entry.advice.v_max_mps));
         };
         while driver.due(&mut feed).map_err(TruthError::from)?.is_some() {
             let (ticked, tick_s) = timed(|| driver.tick(&mut dive, &mut feed, &mut note));
