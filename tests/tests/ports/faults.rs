@@ -333,7 +333,7 @@ fn wrong_device_is_reported_and_the_right_one_used_later() {
     ended.all_used();
     ended.untroubled(2);
     insta::assert_snapshot!(words(&ended.view.said[0]), @r#"
-    wrong: is a Ping360, no echosounder; connect leads to another device than this sensor
+    wrong: is a Ping360 and not an echosounder; check connect
     closed: lost <line>: the device has closed the connection; retrying
     running: Ping echosounder, revision 1, firmware 3.29.0
     "#);
