@@ -1,7 +1,7 @@
 //! Summary of a report as text.
 
 use headrace_config::plain::one_line;
-use headrace_coverage::Unsure;
+use headrace_coverage::{Unsure, Verdict};
 use headrace_monitor::live_messages::UnsureStretch;
 use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, of_it_text, unsure_text};
@@ -187,7 +187,7 @@ fn stretches(report: &Report) -> Vec<String> {
     let fails = |run: &&RunReport| {
         let mut within =
             report.sections.iter().filter(|section| (run.start_m..run.end_m).contains(&section.start_m));
-        within.any(|section| section.verdict == "fail")
+        within.any(|section| section.verdict == Verdict::Fail)
     };
     // Sections that were passed again and have no verdict are listed as unsure.
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none()).filter(fails);

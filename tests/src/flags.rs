@@ -11,7 +11,7 @@ use std::ops::Range;
 use headrace_geometry::frames::{Pose, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::report::SectionReport;
+use headrace_monitor::section_row::SectionRow;
 
 use crate::instrumented::{Dive, Ping};
 use headrace_oracle::wall::Wall;
@@ -206,7 +206,7 @@ impl Journey {
         dive.report.sections.iter().map(|section| self.flag(target_m, section, sd)).collect()
     }
 
-    fn flag(&self, target_m: f64, section: &SectionReport, sd: f64) -> Flag {
+    fn flag(&self, target_m: f64, section: &SectionRow, sd: f64) -> Flag {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
         let due_m = |wall: &Wall, early_m: f64| {

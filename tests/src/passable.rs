@@ -5,6 +5,7 @@
 //! sections exceeds the target. The comparison uses `truth`, which shares nothing with the program's coverage or
 //! advice.
 
+use headrace_coverage::Verdict;
 use headrace_monitor::advice_log::AdviceEntry;
 use headrace_monitor::messages::Notice;
 use headrace_sensor::device::Sense;
@@ -193,16 +194,16 @@ impl Outing {
             section.report.start_m >= from_m && section.report.end_m <= to_m
         };
         let sections: Vec<_> = judged.sections.iter().filter(within).collect();
-        let share = |verdict: &str| {
+        let share = |verdict: Verdict| {
             let count = sections.iter().filter(|section| section.report.verdict == verdict).count();
             count as f64 / sections.len().max(1) as f64
         };
         let falsely = sections
             .iter()
-            .filter(|section| section.report.verdict == "pass" && section.true_hole_m > self.target_m);
+            .filter(|section| section.report.verdict == Verdict::Pass && section.true_hole_m > self.target_m);
         Outcome {
-            passing: share("pass"),
-            unsure: share("cannot_say"),
+            passing: share(Verdict::Pass),
+            unsure: share(Verdict::CannotSay),
             falsely: falsely.count(),
             true_share: sections.iter().map(|section| section.true_hole_m).fold(0.0, f64::max)
                 / self.target_m,

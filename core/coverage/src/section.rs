@@ -109,6 +109,11 @@ pub enum Judgement {
     Cleared,
 }
 
+impl Judgement {
+    /// All changes.
+    pub const ALL: [Self; 3] = [Self::Updated, Self::Raised, Self::Cleared];
+}
+
 /// One section.
 #[expect(clippy::struct_excessive_bools, reason = "the flags are independent of one another")]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

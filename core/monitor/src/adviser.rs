@@ -109,12 +109,16 @@ impl Adviser {
     /// Allocates: never, if the list has room.
     pub fn tick(&mut self, placed: &Arc<Placed>, into: &mut Advised) {
         let Self { part, nothing } = self;
-        core::mem::swap(&mut part.world.resource_mut::<AdviceList>().0, &mut into.entries);
         part.world.resource_mut::<AdviceStream>().0.next_tick();
-        part.world.resource_mut::<PlacedTick>().0 = Arc::clone(placed);
-        part.run(AdviseStage::Advise);
-        part.world.resource_mut::<PlacedTick>().0 = Arc::clone(nothing);
-        core::mem::swap(&mut part.world.resource_mut::<AdviceList>().0, &mut into.entries);
+        if placed.updates().next().is_none() {
+            into.entries.clear();
+        } else {
+            core::mem::swap(&mut part.world.resource_mut::<AdviceList>().0, &mut into.entries);
+            part.world.resource_mut::<PlacedTick>().0 = Arc::clone(placed);
+            part.run(AdviseStage::Advise);
+            part.world.resource_mut::<PlacedTick>().0 = Arc::clone(nothing);
+            core::mem::swap(&mut part.world.resource_mut::<AdviceList>().0, &mut into.entries);
+        }
         self.report(into);
     }
 

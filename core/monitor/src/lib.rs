@@ -61,6 +61,8 @@ pub mod resources;
 pub mod result_stream;
 pub mod ring;
 pub mod run;
+pub mod section_judgement;
+pub mod section_row;
 pub mod source;
 pub mod stage;
 pub mod surveyor;

@@ -124,7 +124,7 @@ impl<S: Stage> Part<S> {
         &mut systems.schedule
     }
 
-    /// Builds the schedules.
+    /// Builds the schedules, and runs them once without input, because the first run allocates.
     ///
     /// Errors: the order of two systems that share data is ambiguous.
     pub(super) fn initialize(&mut self) -> Result<(), PluginError> {
@@ -133,7 +133,9 @@ impl<S: Stage> Part<S> {
             let built = schedule.initialize(world);
             let why = |error| PluginError::Schedule { why: format!("stage {stage:?}: {error:?}") };
             built.map(|_| ()).map_err(why)
-        })
+        })?;
+        S::ALL.iter().for_each(|stage| self.run(*stage));
+        Ok(())
     }
 
     /// Runs the systems of a stage.

@@ -153,10 +153,17 @@ impl Placer {
         let Self { part, readers } = self;
         part.world.resource_mut::<Poses>().0.next_tick();
         part.world.resource_mut::<Inbox>().fill(readers, allowance_bytes);
-        for stage in PlaceStage::ALL {
-            part.run(*stage);
+        if part.world.resource::<Inbox>().is_empty() {
+            self.swap_lists(into);
+            into.events.clear();
+            into.items.clear();
+            into.commands.0.clear();
+        } else {
+            for stage in PlaceStage::ALL {
+                part.run(*stage);
+            }
+            self.swap_lists(into);
         }
-        self.swap_lists(into);
         self.report(into);
         debug_assert!(
             into.items.is_sorted_by_key(|item| item.event),

@@ -77,7 +77,7 @@ impl Loop {
             ticks: 0,
             finished: false,
         };
-        // The first run of a schedule allocates memory. Without packets the run has no other effect.
+        // Outlets may allocate in the first tick. Without packets it has no other effect.
         armed.tick(MonoNs(0));
         armed.ticks = 0;
         armed

@@ -3,6 +3,8 @@
 use bevy_ecs::schedule::SystemSet;
 
 /// A stage of a world. Its systems see all results of the world's earlier stages.
+///
+/// A stage doesn't run in a tick without input for it.
 pub trait Stage: SystemSet + Copy + PartialEq {
     /// All stages of the world, in order.
     const ALL: &'static [Self];
@@ -26,7 +28,8 @@ impl Stage for PlaceStage {
 /// Stages of the surveyor: from placed pings to verdicts.
 ///
 /// Verdicts decide which sections are due next. The stages from [`Self::Walk`] to [`Self::Report`] therefore
-/// run once per stop: a ping that makes sections due, or an update. The other stages run once per tick.
+/// run once per stop: a ping that makes sections due, or an update. [`Self::Classify`] runs once per tick with pings or
+/// updates, [`Self::Surveyed`] once per tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum SurveyStage {
     /// Decides which returns are wall.

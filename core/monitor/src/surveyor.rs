@@ -31,7 +31,7 @@ use super::observations::Observations;
 use super::part::Part;
 use super::placer::{Placed, PlacedTick};
 use super::resources::{Coverage, Digests, Finder, Tally};
-use super::stage::{Stage as _, SurveyStage};
+use super::stage::SurveyStage;
 use classify::{Classified, NearWall};
 use driving::Driving;
 use headrace_coverage::{Outlook, Request};
@@ -83,10 +83,6 @@ impl Surveyor {
         part.add_systems(SurveyStage::Judge, judge::judge_due);
         part.add_systems(SurveyStage::Report, standing::report_standing);
         part.initialize()?;
-        // The first run of a schedule allocates memory. Without pings it has no other effect.
-        for stage in SurveyStage::ALL {
-            part.run(*stage);
-        }
         Ok(Self { part, nothing: Arc::default() })
     }
 
@@ -96,7 +92,9 @@ impl Surveyor {
         part.world.resource_mut::<Found>().clear();
         *part.world.resource_mut::<Cursor>() = Cursor::default();
         part.world.resource_mut::<PlacedTick>().0 = Arc::clone(placed);
-        part.run(SurveyStage::Classify);
+        if !placed.items.is_empty() {
+            part.run(SurveyStage::Classify);
+        }
         while part.world.resource::<Cursor>().next < placed.items.len() {
             for stage in SurveyStage::OF_STOP {
                 part.run(stage);

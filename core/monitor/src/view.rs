@@ -14,6 +14,7 @@ use super::notes::Notes;
 use super::placer::Placed;
 use super::resources::{Coverage, Tally, TickTime};
 use super::result_stream::ResultStream;
+use super::section_row::SectionRow;
 use super::source::SourceInfo;
 use super::surveyor::Surveyor;
 use headrace_geometry::time::MonoNs;
@@ -107,6 +108,11 @@ impl<'a> DiveView<'a> {
     /// Coverage of the wall.
     pub fn coverage(&self) -> &'a Coverage {
         self.surveyor.coverage()
+    }
+
+    /// The section with this index; `None` beyond the tunnel's ends.
+    pub fn section_row(&self, index: i64) -> Option<SectionRow> {
+        SectionRow::of(&self.coverage().sections, index, &self.about.mission.profile)
     }
 
     /// Counts of pings over the whole dive.

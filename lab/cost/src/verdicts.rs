@@ -1,6 +1,7 @@
 //! Errors of a judging method, in the quantities that decide: the hole, and metres falsely passed, falsely failed, or
 //! not judged.
 
+use headrace_coverage::Verdict;
 use crate::point::{Error, Interval, quantile};
 use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
@@ -29,8 +30,8 @@ impl Judged {
             length_m: section.report.end_m - section.report.start_m,
             hole_m: section.report.hole_m.filter(|_| section.report.hole_bounded),
             passes: match section.report.verdict {
-                "pass" => Some(true),
-                "fail" => Some(false),
+                Verdict::Pass => Some(true),
+                Verdict::Fail => Some(false),
                 _ => None,
             },
             true_hole_m: section.true_hole_m,

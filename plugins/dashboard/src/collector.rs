@@ -344,7 +344,6 @@ impl Collector {
         if self.to.is_closed() || !self.waits && self.to.capacity() == 0 {
             return false;
         }
-        let sections = &dive.view().coverage().sections;
         if let Some(compared) = &mut self.compared {
             compared.refresh(dive, |index| _ = self.changed.insert(index));
         }
@@ -353,7 +352,7 @@ impl Collector {
             && let Some(index) = self.changed.pop_first()
         {
             let other = self.compared.as_ref().and_then(|compared| compared.verdict(index));
-            let record = sections.get(index).and_then(|section| SectionRecord::of(index, section));
+            let record = dive.view().section_row(index).and_then(|row| SectionRecord::of(&row));
             changed.extend(record.map(|record| record.compared(other)));
         }
         let now = dive.now();

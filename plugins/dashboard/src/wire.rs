@@ -2,7 +2,8 @@
 //!
 //! `docs/reference/page-feed.md` defines them.
 
-use headrace_coverage::{Cause, Section, Unsure, Verdict};
+use headrace_coverage::{Cause, Unsure, Verdict};
+use headrace_monitor::section_row::SectionRow;
 
 /// Kind byte of a frame of sections.
 pub const SECTIONS: u8 = 1;
@@ -80,21 +81,17 @@ impl SectionRecord {
         }
     }
 
-    /// Converts a section of the loop; `None` if the index is out of range.
+    /// Encodes a row; `None` if its index is out of range.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
-    pub fn of(index: i64, section: &Section) -> Option<Self> {
-        let verdict = match section.verdict {
-            Verdict::Open if section.not_inspected => NOT_INSPECTED,
-            verdict => byte(verdict),
-        };
-        let cause =
-            section.evidence.filter(|_| section.verdict == Verdict::Fail).map(|evidence| evidence.cause);
-        let flags = u8::from(section.is_flagged()) | u8::from(section.settled) << 1;
-        let hole = section.hole.map_or([f32::NAN, section.hole_sd_m as f32, f32::NAN, f32::NAN], |hole| {
-            [hole.diameter_m, section.hole_sd_m, hole.x_m, hole.arc_m].map(|value| value as f32)
-        });
-        let (cause, why) = (number(&Cause::ALL, cause), number(&Unsure::ALL, section.unsure()));
-        Some(Self { index: i32::try_from(index).ok()?, verdict, cause, why, flags, hole })
+    pub fn of(row: &SectionRow) -> Option<Self> {
+        let verdict =
+            if row.not_inspected && row.verdict == Verdict::Open { NOT_INSPECTED } else { byte(row.verdict) };
+        let cause = number(&Cause::ALL, row.cause.map(|evidence| evidence.cause));
+        let why = number(&Unsure::ALL, row.cannot_say);
+        let flags = u8::from(row.is_flagged()) | u8::from(row.settled) << 1;
+        let or_nan = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
+        let hole = [or_nan(row.hole_m), row.hole_sd_m as f32, or_nan(row.hole_x_m), or_nan(row.hole_arc_m)];
+        Some(Self { index: i32::try_from(row.index).ok()?, verdict, cause, why, flags, hole })
     }
 
     /// Adds the verdict for a second target.

@@ -6,6 +6,7 @@
 //!
 //! D is the diameter of a section's hole: the largest circle on its wall without samples.
 
+use headrace_coverage::Verdict;
 use std::collections::BTreeMap;
 
 use headrace_geometry::math;
@@ -213,7 +214,7 @@ impl Figures {
         for section in Report::of(&dive).sections {
             let length_m = section.end_m - section.start_m;
             figures.way_m += length_m;
-            figures.passed_m += if section.verdict == "pass" { length_m } else { 0.0 };
+            figures.passed_m += if section.verdict == Verdict::Pass { length_m } else { 0.0 };
             if let Some(hole_m) = section.hole_m.filter(|_| section.hole_bounded) {
                 figures.holes_m.insert(math::round_to_i64(section.start_m * 1000.0), hole_m);
             }

@@ -14,9 +14,10 @@ use headrace_fusion::Navigation;
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::messages::Outcome;
 use headrace_monitor::placer::PlacedTick;
-use headrace_monitor::report::{Report, SectionReport};
+use headrace_monitor::report::Report;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::run::Loop;
+use headrace_monitor::section_row::SectionRow;
 use headrace_monitor::stage::SurveyStage;
 use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::drive::{Coming, Pace, PacketSource, drive};
@@ -109,7 +110,7 @@ pub struct Recorded {
 #[derive(Debug, Clone)]
 pub struct JudgedSection {
     /// Report of the section.
-    pub report: SectionReport,
+    pub report: SectionRow,
     /// D_true, m; infinite without samples.
     pub true_hole_m: f64,
     /// True minus estimated chainage, m.
@@ -221,7 +222,7 @@ impl Recorded {
             .surveyor()
             .resource::<Seen>()
             .map_or_else(Shifts::default, |seen| seen.shifts(&self.scenery));
-        let judge = |section: &SectionReport| {
+        let judge = |section: &SectionRow| {
             let shift_m = shifts.about(section.start_m, section.end_m);
             let true_hole_m = self.true_hole_m(section.start_m + shift_m, section.end_m + shift_m);
             JudgedSection { report: section.clone(), true_hole_m, shift_m }

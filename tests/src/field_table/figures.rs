@@ -1,5 +1,6 @@
 //! Figures of a cell: verdicts and standard deviations compared with the truth.
 
+use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_monitor::report::AdviceReport;
 use headrace_sensor::device::Sense;
@@ -126,7 +127,8 @@ impl Figures {
     }
 
     fn judge(&mut self, section: &JudgedSection, target_m: f64, seed: u64) {
-        let (passed, failed) = (section.report.verdict == "pass", section.report.verdict == "fail");
+        let (passed, failed) =
+            (section.report.verdict == Verdict::Pass, section.report.verdict == Verdict::Fail);
         let is = |condition: bool| u32::from(condition);
         let share = section.true_hole_m / target_m;
         self.sections += 1;
@@ -153,7 +155,8 @@ impl Figures {
         if section.true_hole_m <= target_m {
             self.passable_m += length_m;
         }
-        let place = ["pass", "fail", "cannot_say", "open"].iter().position(|v| *v == section.report.verdict);
+        let verdicts = [Verdict::Pass, Verdict::Fail, Verdict::CannotSay, Verdict::Open];
+        let place = verdicts.iter().position(|verdict| *verdict == section.report.verdict);
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }

@@ -9,8 +9,10 @@ mod knowing;
 mod matrix;
 mod remedy;
 
+use headrace_coverage::Verdict;
 use headrace_coverage::{Cause, Evidence};
-use headrace_monitor::report::{Report, SectionReport};
+use headrace_monitor::report::Report;
+use headrace_monitor::section_row::SectionRow;
 
 use crate::scenes;
 pub use draw::{Drawn, Injected, KINDS};
@@ -112,7 +114,7 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     let mut drawn = Drawn::of(seed, kinds);
     let without_all = report(&drawn, &|_| false);
     let inner_m = [draw::START_M + END_M, drawn.end_m - 0.25];
-    let is_inner = |section: &&SectionReport| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
+    let is_inner = |section: &&SectionRow| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
     // The target may be changed here: holes don't depend on it. All later reports use it for their verdicts.
@@ -129,7 +131,9 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     };
     let mut sections = Vec::new();
     for section in all.sections.iter().filter(is_inner) {
-        let Some(evidence) = section.cause.as_ref().filter(|_| section.verdict == "fail") else { continue };
+        let Some(evidence) = section.cause.as_ref().filter(|_| section.verdict == Verdict::Fail) else {
+            continue;
+        };
         let hole_m = |report: &Report| hole_at_m(report, section.start_m);
         let without_m: Vec<f64> = without.iter().map(hole_m).collect();
         let passes = |report: &Report| hole_m(report) <= drawn.target_m;

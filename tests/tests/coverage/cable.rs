@@ -1,5 +1,6 @@
 //! A cable counter that gets stuck while the vehicle moves. The fault is reported at once and passes no section.
 
+use headrace_coverage::Verdict;
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
 use headrace_monitor::messages::{PlacedItem, Placement};
@@ -114,7 +115,7 @@ fn stuck_cable_passes_no_section_far_over_the_target() {
         let over: Vec<_> = inner.filter(|section| section.true_hole_m > target_m).collect();
         let passed: Vec<(f64, f64)> = over
             .iter()
-            .filter(|section| section.report.verdict == "pass")
+            .filter(|section| section.report.verdict == Verdict::Pass)
             .map(|section| (section.report.start_m, section.true_hole_m / target_m))
             .collect();
         let far = passed.iter().filter(|(_, ratio)| *ratio > 1.1).count();
@@ -161,9 +162,11 @@ fn velocity_log_that_contradicts_the_counter_is_reported_and_passes_nothing_wron
     // The velocity log misses a quarter of the 12 m per minute at most.
     assert!((0.5..3.5).contains(&alert.worst_m.unwrap()), "{alert:?}");
     let target_m = wrong.report.target_m;
-    let is_wrong =
-        |section: &&truth::JudgedSection| section.report.verdict == "pass" && section.true_hole_m > target_m;
+    let is_wrong = |section: &&truth::JudgedSection| {
+        section.report.verdict == Verdict::Pass && section.true_hole_m > target_m
+    };
     assert_eq!(wrong.sections.iter().filter(is_wrong).count(), 0);
-    let cannot_say = wrong.sections.iter().filter(|section| section.report.verdict == "cannot_say").count();
+    let cannot_say =
+        wrong.sections.iter().filter(|section| section.report.verdict == Verdict::CannotSay).count();
     assert!(cannot_say > 20, "from the alert on: {cannot_say}");
 }

@@ -1,5 +1,6 @@
 //! Counters with a resolution of 1 cm on swinging cables cause no wrong displayed speed and no wrong verdict.
 
+use headrace_coverage::Verdict;
 use headrace_simulator::Scene;
 use headrace_tests::{scenes, truth};
 
@@ -66,8 +67,8 @@ fn wrong(scene: &Scene, most_mps: f64) -> Wrong {
         let ratio = section.true_hole_m / target_m;
         wrong.sections += 1;
         match section.report.verdict {
-            "pass" => wrong.passed += usize::from(ratio > 1.1),
-            "fail" => wrong.failed += usize::from(ratio < 0.9),
+            Verdict::Pass => wrong.passed += usize::from(ratio > 1.1),
+            Verdict::Fail => wrong.failed += usize::from(ratio < 0.9),
             _ => wrong.cannot_say += 1,
         }
     }

@@ -2,6 +2,7 @@
 //!
 //! `cargo bench -p headrace_tests --bench field` computes the whole table.
 
+use headrace_coverage::Verdict;
 use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, KINDS_OF_SOURCES, VEHICLES};
 use headrace_tests::truth;
 
@@ -107,12 +108,12 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
         figures.add(&judged, &dive.scene, cell.start_m);
         figures
     };
-    let passed = all("pass");
+    let passed = all(Verdict::Pass);
     assert!(passed.over > 5 && passed.passed_over == passed.over, "{passed:?}");
     // These figures include the dive's ends, where a section has a neighbour on one side only.
     assert!((1..=passed.over).contains(&passed.passed_far), "{passed:?}");
     assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
-    let failed = all("fail");
+    let failed = all(Verdict::Fail);
     assert!(failed.failed_under == failed.under && failed.passed_over == 0, "{failed:?}");
     let told_m = failed.way_m[1];
     judged.sections.remove(judged.sections.len() / 2);

@@ -3,6 +3,7 @@
 //! A flag is raised when further forward motion can no longer undo a fail, and cleared when a later pass fills the
 //! hole. The oracle has the poses and all samples, but not the order in which the loop judges sections.
 
+use headrace_coverage::Verdict;
 use std::sync::LazyLock;
 
 use headrace_geometry::math;
@@ -161,7 +162,7 @@ fn filled_hole_has_no_flag() {
     every_flag(reversing, |judged, due, _| {
         let section = judged.dive.report.sections.iter().find(|section| section.start_m >= due.start_m)?;
         let stands = due.raised_s.is_some() && due.cleared_s.is_none();
-        (stands && section.verdict == "pass").then_some("passes, and keeps its flag")
+        (stands && section.verdict == Verdict::Pass).then_some("passes, and keeps its flag")
     });
 }
 

@@ -1,5 +1,6 @@
 //! Dives that spend hours in one place: a parked vehicle, and a vehicle that goes back and forth a hundred times.
 
+use headrace_coverage::Verdict;
 use std::fmt::Write as _;
 
 use headrace_monitor::run::Loop;
@@ -55,7 +56,7 @@ fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
     let pairs = once.sections.iter().zip(&long.sections);
     for (a, b) in pairs.filter(|(a, _)| (FROM_M..END_M - 1.0).contains(&a.report.start_m)) {
         assert_eq!(a.report.verdict, b.report.verdict, "section {}", a.report.start_m);
-        passed += u32::from(a.report.verdict == "pass");
+        passed += u32::from(a.report.verdict == Verdict::Pass);
         let (Some(least_m), Some(most_m)) = (b.report.hole_least_m, b.report.hole_most_m) else {
             panic!("section {}: no bounds", b.report.start_m)
         };

@@ -3,13 +3,15 @@
 //! They are a mirror, other origins of chainage and arc length, other names and another order of heads, and another
 //! tick length.
 
+use headrace_coverage::Verdict;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::{Piece, Profile};
-use headrace_monitor::report::{SectionReport, SpreadReport};
+use headrace_monitor::report::SpreadReport;
+use headrace_monitor::section_row::SectionRow;
 use headrace_oracle::wall::Wall;
 use headrace_tests::instrumented::{self, Dive};
 use headrace_tests::random_dives::{self, seeded};
@@ -36,10 +38,10 @@ impl Beside<'_> {
         assert_eq!(here.len(), there.len(), "sections");
         let wall = Wall::new(self.here.samples().map(|sample| sample.place), self.here.profile.perimeter_m())
             .unwrap();
-        let verdicts: std::collections::BTreeSet<_> = here.iter().map(|section| section.verdict).collect();
+        let verdicts: Vec<Verdict> = here.iter().map(|section| section.verdict).collect();
         assert!(
-            verdicts.contains("fail") && verdicts.contains("pass"),
-            "the dive has too few kinds of verdicts: {verdicts:?}"
+            verdicts.contains(&Verdict::Fail) && verdicts.contains(&Verdict::Pass),
+            "the dive has too few kinds of verdicts"
         );
         for (a, b) in here.iter().zip(there) {
             let wrong = self.differs(&wall, a, b);
@@ -47,7 +49,7 @@ impl Beside<'_> {
         }
     }
 
-    fn differs(&self, wall: &Wall, a: &SectionReport, b: &SectionReport) -> Vec<&'static str> {
+    fn differs(&self, wall: &Wall, a: &SectionRow, b: &SectionRow) -> Vec<&'static str> {
         let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE_M;
         let both = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => near(a, b),
@@ -61,7 +63,7 @@ impl Beside<'_> {
                 && both(a.max_m, b.max_m)
                 && both(deviations[0], deviations[1])
         };
-        let cause = |section: &SectionReport| section.cause.map(|evidence| evidence.cause);
+        let cause = |section: &SectionRow| section.cause.map(|evidence| evidence.cause);
         // The dives may report different holes of the same size. The hole reported for the second dive must also be a
         // hole of the first dive.
         let is_hole_here = b.hole_x_m.zip(b.hole_arc_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {

@@ -3,11 +3,13 @@
 //! The oracle uses only the samples and the definitions. It has no cells, no search radius, and no order of judging.
 //! Flags are checked in `flags.rs`.
 
+use headrace_coverage::Verdict;
 use std::collections::BTreeMap;
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
-use headrace_monitor::report::{SectionReport, SpreadReport};
+use headrace_monitor::report::SpreadReport;
+use headrace_monitor::section_row::SectionRow;
 use headrace_oracle::wall::{Place, Wall};
 use headrace_tests::flags::{NEAR_M, PARTS, all_passed_from_m, first_failing_m, reached};
 use headrace_tests::instrumented::{Dive, Ping, Sample};
@@ -22,7 +24,7 @@ const SEARCH_M: f64 = 12.0;
 
 /// Checks every section of every dive with `misses`, which may return the description of an error.
 #[track_caller]
-fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionReport) -> Option<String>) {
+fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionRow) -> Option<String>) {
     let mut said = Vec::new();
     for (seeded, dive) in DIVES.iter() {
         let wall = Wall::new(dive.samples().map(|sample| sample.place), dive.profile.perimeter_m()).unwrap();
@@ -41,12 +43,12 @@ fn random_dives_cover_every_verdict() {
     let mut count = BTreeMap::new();
     for (seeded, dive) in DIVES.iter() {
         for section in &dive.report.sections {
-            *count.entry((seeded.kind, section.verdict)).or_insert(0) += 1;
+            *count.entry((seeded.kind, section.verdict.as_str())).or_insert(0) += 1;
         }
     }
-    for (verdict, least) in [("pass", 200), ("fail", 1000), ("cannot_say", 50)] {
-        let all: u32 = count.iter().filter(|((_, v), _)| *v == verdict).map(|(_, n)| n).sum();
-        assert!(all >= least, "{verdict}: {all} sections of {count:?}");
+    for (verdict, least) in [(Verdict::Pass, 200), (Verdict::Fail, 1000), (Verdict::CannotSay, 50)] {
+        let all: u32 = count.iter().filter(|((_, v), _)| *v == verdict.as_str()).map(|(_, n)| n).sum();
+        assert!(all >= least, "{verdict:?}: {all} sections of {count:?}");
     }
 }
 
@@ -63,15 +65,15 @@ fn sample_lies_on_the_design_wall_along_its_reference_ray() {
 }
 
 /// Whether a diameter, m, is within the bounds of a section's hole.
-fn is_within(section: &SectionReport, diameter_m: f64) -> bool {
+fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     let (Some(least_m), Some(most_m)) = (section.hole_least_m, section.hole_most_m) else { return false };
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
 /// Whether a section passed with the samples of only some visits. Samples of other visits can only make its hole
 /// smaller.
-fn is_of_a_visit(section: &SectionReport, diameter_m: f64) -> bool {
-    let most_m = section.hole_most_m.filter(|_| section.verdict == "pass");
+fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
+    let most_m = section.hole_most_m.filter(|_| section.verdict == Verdict::Pass);
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
 }
 
@@ -82,8 +84,9 @@ fn holes_are_the_largest_empty_circles() {
         let largest = wall.largest(section.start_m, section.end_m)?;
         let expected_m = 2.0 * largest.radius_m;
         if largest.radius_m > SEARCH_M {
-            let said =
-                !section.hole_bounded && hole_m <= expected_m && ["fail", "open"].contains(&section.verdict);
+            let said = !section.hole_bounded
+                && hole_m <= expected_m
+                && [Verdict::Fail, Verdict::Open].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
         // Packing moves samples by micrometres; the bounds include this movement.
@@ -127,19 +130,25 @@ fn verdicts_follow_from_hole_sigma_and_target() {
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
         let from_end_m = largest.centre[0] - largest.radius_m - passed_m;
         let expected = match section.verdict {
-            _ if hole_m + twice_m <= target_m => "pass",
-            either @ ("fail" | "open") if clear_m.abs() <= near_m => either,
-            either @ ("fail" | "cannot_say") if (hole_m - twice_m - target_m).abs() < 0.01 => either,
-            either @ ("open" | "cannot_say") if behind_m.abs() <= near_m => either,
-            either @ ("open" | "cannot_say" | "fail") if from_end_m.abs() <= near_m || is_near => either,
+            _ if hole_m + twice_m <= target_m => Verdict::Pass,
+            either @ (Verdict::Fail | Verdict::Open) if clear_m.abs() <= near_m => either,
+            either @ (Verdict::Fail | Verdict::CannotSay) if (hole_m - twice_m - target_m).abs() < 0.01 => {
+                either
+            }
+            either @ (Verdict::Open | Verdict::CannotSay) if behind_m.abs() <= near_m => either,
+            either @ (Verdict::Open | Verdict::CannotSay | Verdict::Fail)
+                if from_end_m.abs() <= near_m || is_near =>
+            {
+                either
+            }
             // A flag stays until the hole is filled.
-            either @ "fail" if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
-            _ if clear_m > 0.0 => "fail",
-            _ if behind_m < 0.0 || from_end_m < 0.0 => "open",
-            _ => "cannot_say",
+            either @ Verdict::Fail if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
+            _ if clear_m > 0.0 => Verdict::Fail,
+            _ if behind_m < 0.0 || from_end_m < 0.0 => Verdict::Open,
+            _ => Verdict::CannotSay,
         };
         (section.verdict != expected)
-            .then(|| format!("{}, not {expected}: {hole_m} m, {twice_m} m", section.verdict))
+            .then(|| format!("{:?}, not {expected:?}: {hole_m} m, {twice_m} m", section.verdict))
     });
 }
 

@@ -1,6 +1,7 @@
 //! Stuck devices: a head or inertial unit that repeats its output for ever counts as silent.
 
 use headrace_coverage::Cause;
+use headrace_coverage::Verdict;
 use headrace_simulator::Scene;
 use headrace_tests::{scenes, truth};
 
@@ -44,7 +45,7 @@ fn dive(scene: &Scene) -> Told {
             v_max_mps = last.advice.v_max_mps;
         }
     });
-    let passed = judged.sections.iter().filter(|section| section.report.verdict == "pass");
+    let passed = judged.sections.iter().filter(|section| section.report.verdict == Verdict::Pass);
     let report = &judged.report;
     Told {
         passed_m: passed.map(|section| section.true_hole_m).collect(),

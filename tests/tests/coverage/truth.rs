@@ -1,5 +1,6 @@
 //! Checks the D_true oracle against other computations.
 
+use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, shapes};
 use headrace_oracle::outline::Outline;
@@ -182,7 +183,10 @@ fn echoes_of_the_vehicle_pass_no_section() {
     assert!(occluded > 200, "{occluded} echoes of the vehicle");
     for section in &dive.sections {
         let (hole_m, start_m) = (section.true_hole_m, section.report.start_m);
-        assert!(section.report.verdict != "pass" || hole_m <= 1.1 * 0.5, "{start_m}: passed with {hole_m} m");
+        assert!(
+            section.report.verdict != Verdict::Pass || hole_m <= 1.1 * 0.5,
+            "{start_m}: passed with {hole_m} m"
+        );
         if settled_below(section, 16.0, 1.5) {
             let off_m = section.report.hole_m.unwrap() - hole_m;
             assert!(off_m.abs() < 0.05, "{start_m}: {off_m}");

@@ -2,6 +2,7 @@
 //!
 //! Cases are stuck and noisy heads, murk, boulders and caves.
 
+use headrace_coverage::Verdict;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -98,7 +99,7 @@ fn compared(vehicle: &str, scene: &str, near_m: f64) -> Compared {
         }
     }
     let wall = Wall::new(true_wall.iter().map(|sample| sample.place), dive.profile.perimeter_m()).unwrap();
-    for section in dive.report.sections.iter().filter(|section| section.verdict == "pass") {
+    for section in dive.report.sections.iter().filter(|section| section.verdict == Verdict::Pass) {
         let true_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;
         is.passed += 1;
         is.worst = is.worst.max(true_m / dive.report.target_m);
@@ -134,7 +135,7 @@ fn one_stuck_head_of_several_is_reported_and_the_others_count() {
         // The stuck head's returns pass no section.
         let others = dive.samples_of(|head| head != stuck);
         let wall = Wall::new(others, dive.profile.perimeter_m()).unwrap();
-        for section in dive.report.sections.iter().filter(|section| section.verdict == "pass") {
+        for section in dive.report.sections.iter().filter(|section| section.verdict == Verdict::Pass) {
             let true_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;
             assert!(true_m <= 1.1 * dive.report.target_m, "{at}: section {}: {true_m} m", section.start_m);
         }
@@ -242,7 +243,7 @@ fn caves_heaps_boulders_traps_and_side_tunnels_count_as_wall() {
             dive.pings.iter().filter_map(|ping| ping.sample.or(ping.doubtful)).map(|sample| sample.place);
         let wall = Wall::new(all, dive.profile.perimeter_m()).unwrap();
         for section in &dive.report.sections {
-            if section.doubtful_returns > 0 && section.verdict == "fail" {
+            if section.doubtful_returns > 0 && section.verdict == Verdict::Fail {
                 let hole_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;
                 assert!(hole_m > dive.report.target_m, "{name}, section {}: {hole_m} m", section.start_m);
             }

@@ -3,6 +3,7 @@
 //! Heads that are apart along the hull start in phase for the speed that the advice gives for their mode. They keep
 //! turning in the same way when the pilot drives at another speed.
 
+use headrace_coverage::Verdict;
 use std::fmt::Write as _;
 
 use headrace_geometry::time::DurNs;
@@ -166,7 +167,7 @@ impl Judged {
         let sections: Vec<_> =
             dive.report.sections.iter().filter(|section| within(section.start_m, section.end_m)).collect();
         assert!(sections.len() >= 39, "{}: {} sections", case.what, sections.len());
-        let share = |verdict: &str| {
+        let share = |verdict: Verdict| {
             sections.iter().filter(|section| section.verdict == verdict).count() as f64
                 / sections.len() as f64
         };
@@ -174,8 +175,8 @@ impl Judged {
         holes.sort_by(f64::total_cmp);
         let predicted_t_m = dive.median(|beat| beat.advice.predicted_t_m.unwrap());
         Self {
-            failing: share("fail"),
-            passing: share("pass"),
+            failing: share(Verdict::Fail),
+            passing: share(Verdict::Pass),
             predicted_t_m,
             holes: [holes.len() / 2, holes.len() - 1].map(|k| holes[k] / predicted_t_m),
         }

@@ -1,6 +1,7 @@
 //! A simulated pilot who gets advice. The pilot hurries, is shown a missed stretch, goes back, and leaves no missed
 //! section.
 
+use headrace_coverage::Verdict;
 use headrace_simulator::{Message, Scene, Simulation};
 use headrace_tests::{scenes, truth};
 
@@ -49,7 +50,9 @@ fn pilot_goes_back_and_leaves_no_missed_section() {
     let [left, made_good] = [scene(&format!("goes_back = false\n{HURRY}")), hurried].map(|scene| {
         let dive = truth::dive(&scene);
         let within = dive.sections.iter().map(|section| &section.report);
-        within.filter(|section| (8.0..18.0).contains(&section.start_m) && section.verdict == "fail").count()
+        within
+            .filter(|section| (8.0..18.0).contains(&section.start_m) && section.verdict == Verdict::Fail)
+            .count()
     });
     println!("failed {left} without going back, {made_good} after");
     assert!(left > 8 && made_good == 0, "{left} {made_good}");

@@ -8,6 +8,7 @@ use super::console::ConsoleCounts;
 use super::head_descriptions::HeadDescriptions;
 use super::other_targets::OtherTargetReport;
 use super::run::Loop;
+use super::section_row::SectionRow;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
 use headrace_geometry::time::MonoNs;
@@ -15,7 +16,6 @@ use headrace_geometry::time::MonoNs;
 mod advice;
 mod inspected;
 mod runs;
-mod sections;
 mod smoothing;
 pub mod smoothing_changes;
 mod sources;
@@ -26,11 +26,9 @@ mod unsure;
 pub use advice::{AdviceReport, AlternativeReport};
 pub use inspected::{CoverageExtentReport, NotInspectedReport};
 pub use runs::{ReturnReport, RunReport, go_back};
-pub use sections::{DeviationReport, SectionReport};
 pub use smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport};
 pub use spread::SpreadReport;
-use spread::spread_report;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 pub use unsure::NoVerdictReport;
 
@@ -61,7 +59,7 @@ pub struct Report {
     /// Metres by verdict, and spacings over all sections.
     pub summary: SummaryReport,
     /// Every section of the coverage extent, in the order of chainage.
-    pub sections: Vec<SectionReport>,
+    pub sections: Vec<SectionRow>,
     /// Runs of neighbouring flagged sections, in the order of their numbers.
     pub runs: Vec<RunReport>,
     /// Stretches that neither pass nor fail although no more samples will come, in the order of chainage.
@@ -229,8 +227,7 @@ impl Report {
     pub fn of(dive: &Loop) -> Self {
         let (coverage, log) = (dive.view().coverage(), dive.advice_log());
         let sections = &coverage.sections;
-        let of_the_way =
-            || sections.sections_of(coverage.frontier.way()).filter_map(|k| Some((k, sections.get(k)?)));
+        let way = || sections.sections_of(coverage.frontier.way());
         let report = Self {
             report_version: REPORT_VERSION,
             not_inspected: inspected::not_inspected(dive),
@@ -241,10 +238,8 @@ impl Report {
             confidence_sd: confidence(sections.confidence_sd()),
             coverage_extent: inspected::way_report(coverage),
             dive: dive_report(dive),
-            summary: summarise(sections.section_m(), of_the_way().map(|(_, section)| section)),
-            sections: of_the_way()
-                .map(|(k, section)| sections::section_report(sections, k, section, dive))
-                .collect(),
+            summary: summarise(sections.section_m(), way().filter_map(|index| sections.get(index))),
+            sections: way().filter_map(|index| dive.view().section_row(index)).collect(),
             runs: runs::run_reports(dive),
             no_verdict: unsure::unsure_reports(coverage),
             go_back: runs::go_back(sections),
@@ -380,10 +375,10 @@ fn summarise<'a>(section_m: f64, sections: impl Iterator<Item = &'a Section>) ->
         not_inspected_m,
         flags_raised: raised,
         flags_cleared: cleared,
-        t_x: spread_report(&t_x),
-        t_y: spread_report(&t_y),
-        t: spread_report(&t),
-        hole: spread_report(&hole),
+        t_x: SpreadReport::from(&t_x),
+        t_y: SpreadReport::from(&t_y),
+        t: SpreadReport::from(&t),
+        hole: SpreadReport::from(&hole),
     }
 }
 

@@ -19,13 +19,15 @@ pub struct SpreadReport {
     pub sd_m: Option<f64>,
 }
 
-pub(super) fn spread_report(spread: &Spread) -> SpreadReport {
-    let known = |value: f64| (spread.count > 0).then_some(value);
-    SpreadReport {
-        count: spread.count,
-        min_m: known(spread.min),
-        mean_m: spread.mean(),
-        max_m: known(spread.max),
-        sd_m: spread.sd(),
+impl From<&Spread> for SpreadReport {
+    fn from(spread: &Spread) -> Self {
+        let known = |value: f64| (spread.count > 0).then_some(value);
+        Self {
+            count: spread.count,
+            min_m: known(spread.min),
+            mean_m: spread.mean(),
+            max_m: known(spread.max),
+            sd_m: spread.sd(),
+        }
     }
 }

@@ -7,8 +7,9 @@ use crate::alert_list::RunInput;
 use crate::messages::Notice;
 use crate::observations::ObservedKind;
 use crate::resources::{Coverage, Digests, Finder, TunnelDesign};
-use crate::result_stream::{RecordKind, ResultStream};
-use headrace_coverage::{Judging, Request, RunChange, RunId, Section, Sections};
+use crate::result_stream::RecordKind;
+use crate::section_judgement;
+use headrace_coverage::{Judging, Request, RunChange, RunId, Sections};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::reading::SourceId;
@@ -55,7 +56,7 @@ fn judge_one(
         debug_assert!(false, "section {} has changed, but doesn't exist", request.section);
         return;
     };
-    digest(&mut digests.judgements, request, change as u64, section);
+    section_judgement::record(&mut digests.judgements, request.at, request.section, change, section);
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);
         let x_m = sections.bounds_m(request.section).0;
@@ -63,31 +64,6 @@ fn judge_one(
         if observations.note(kind, request.at, x_m, off_m) {
             digest_observation(digests, kind, None, request.at, (x_m, off_m));
         }
-    }
-}
-
-fn digest(judgements: &mut ResultStream, request: &Request, change: u64, section: &Section) {
-    judgements
-        .record(RecordKind::Section)
-        .integer(request.at.0)
-        .integer(request.section as u64)
-        .integer(change)
-        .integer(section.verdict as u64)
-        .number(section.hole.map_or(0.0, |hole| hole.diameter_m))
-        .number(section.hole_sd_m)
-        .integer(section.evidence.map_or(u64::MAX, |evidence| evidence.cause as u64))
-        .number(section.hole.map_or(0.0, |hole| hole.x_m))
-        .number(section.hole.map_or(0.0, |hole| hole.arc_m));
-    if let Some(evidence) = section.evidence {
-        judgements
-            .number(evidence.speed_mps)
-            .number(evidence.t_y_m)
-            .number(evidence.middle_t_y_m)
-            .number(evidence.missing_share)
-            .number(evidence.swing_m)
-            .integer(u64::from(evidence.silent_heads.bits()))
-            .integer(u64::from(evidence.causes.bits()))
-            .number(evidence.with_losses_mps);
     }
 }
 

@@ -397,7 +397,7 @@ impl Figures {
     fn of(scene: &Scene, has_boulders: bool) -> Result<Self, CostError> {
         let JudgedDive { report, .. } = Recorded::of(scene, &scene.vehicle)?.judged(&scene.vehicle)?;
         let millimetres = |m: f64| math::round_to_i64(1000.0 * m);
-        let section = |section: &headrace_monitor::report::SectionReport| {
+        let section = |section: &headrace_monitor::section_row::SectionRow| {
             let hole_m = section.hole_m.filter(|_| section.hole_bounded);
             (millimetres(section.start_m), hole_m, section.verdict)
         };

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use headrace_coverage::{Cause, Judgement, RunChange, Verdict, back_to_m};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::pilot_text::{CauseFigures, Missed as MissedText, cause_text, cleared_text, flag_text};
+use headrace_monitor::pilot_text::{Missed as MissedText, cause_text, cleared_text, flag_text};
+use headrace_monitor::section_judgement::SectionJudgement;
 
 use super::messages::{Level, Log, Missed, Section, Stretch, rounded};
 use super::site::Site;
@@ -15,20 +16,6 @@ const EVERY: DurNs = DurNs(2_000_000_000);
 ///
 /// The log stays small even if a dive misses everything.
 const MOST_STRETCHES: usize = 40;
-
-/// A judgement of a section, as published.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Judged {
-    pub(super) at: MonoNs,
-    pub(super) section: i64,
-    pub(super) change: u64,
-    pub(super) verdict: Verdict,
-    pub(super) hole_m: f64,
-    pub(super) hole_sd_m: f64,
-    pub(super) hole_x_m: f64,
-    pub(super) hole_arc_m: f64,
-    pub(super) cause: Option<CauseFigures>,
-}
 
 /// Judgements of all sections so far.
 #[derive(Debug, Default)]
@@ -54,12 +41,17 @@ impl Sections {
     /// Processes the judgement of a section. Returns the section for display, and the alerts to the pilot.
     ///
     /// `v_max_mps` is the advised speed.
-    pub(super) fn judge(&mut self, judged: &Judged, site: &Site, v_max_mps: f64) -> (Section, Vec<Log>) {
-        let index = judged.section;
+    pub(super) fn judge(
+        &mut self,
+        judged: &SectionJudgement,
+        site: &Site,
+        v_max_mps: f64,
+    ) -> (Section, Vec<Log>) {
+        let index = judged.index;
         let flagged = match judged.change {
-            change if change == Judgement::Raised as u64 => true,
-            change if change == Judgement::Cleared as u64 => false,
-            _ => self.flagged.contains_key(&index),
+            Judgement::Raised => true,
+            Judgement::Cleared => false,
+            Judgement::Updated => self.flagged.contains_key(&index),
         };
         let before = self.flagged.get(&index).copied();
         let now = judged.cause.filter(|_| flagged).map(|figures| (figures.cause(), judged.hole_m));
@@ -75,8 +67,15 @@ impl Sections {
     }
 
     /// Creates the alert to the pilot about a changed run.
-    fn say(&mut self, id: u64, change: u64, judged: &Judged, site: &Site, v_max_mps: f64) -> Option<Log> {
-        let index = judged.section;
+    fn say(
+        &mut self,
+        id: u64,
+        change: u64,
+        judged: &SectionJudgement,
+        site: &Site,
+        v_max_mps: f64,
+    ) -> Option<Log> {
+        let index = judged.index;
         let span = self.runs.entry(id).or_insert((index, index));
         if change == RunChange::Cleared as u64 {
             let (from, to) = self.runs.remove(&id)?;
@@ -143,8 +142,8 @@ fn bounds_m(index: i64, site: &Site) -> (f64, f64) {
     (end(index), end(index + 1))
 }
 
-fn shown(judged: &Judged, flagged: bool, site: &Site) -> Section {
-    let (start_m, end_m) = bounds_m(judged.section, site);
+fn shown(judged: &SectionJudgement, flagged: bool, site: &Site) -> Section {
+    let (start_m, end_m) = bounds_m(judged.index, site);
     let cause = judged.cause.filter(|_| flagged || judged.verdict == Verdict::Fail);
     Section {
         timestamp: judged.at.into(),

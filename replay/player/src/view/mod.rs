@@ -29,17 +29,16 @@ mod wall;
 #[cfg(test)]
 mod tests;
 
-use headrace_coverage::{Again, Cause, Causes, Failing, Verdict};
 use headrace_fusion::NoFix;
 use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::pilot_text::{AdviceFigures, CauseFigures, advice_text, recorded_observation_text};
+use headrace_monitor::pilot_text::{AdviceFigures, advice_text, recorded_observation_text};
 use headrace_monitor::result_stream::{Record, RecordKind, first_record, text_of};
+use headrace_monitor::section_judgement::SectionJudgement;
 use headrace_sampling::advice::{Reason, Remedy};
-use headrace_sampling::head::HeadSet;
 use serde::Serialize;
 
-use self::judged::{Judged, Sections};
+use self::judged::Sections;
 use self::messages::{
     Advice, Deviations, FrameTransform, FrameTransforms, Known, Level, Log, Pose, PoseInFrame, Turn, Vehicle,
     Xyz, rounded,
@@ -111,7 +110,10 @@ impl View {
             RecordKind::Pose => self.pose(&mut words, made),
             RecordKind::NoPose => self.no_pose(&mut words, made),
             RecordKind::Sample => self.sample(&mut words, made),
-            RecordKind::Section => self.section(&mut words, made),
+            RecordKind::Section => {
+                self.section(&SectionJudgement::read(record.words)?, made);
+                Some(())
+            }
             RecordKind::Run => {
                 self.sections.run(words.integer()?, words.integer()?);
                 Some(())
@@ -202,41 +204,13 @@ impl View {
         Some(())
     }
 
-    fn section(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
-        let at = MonoNs(words.integer()?);
-        let section = words.integer()?.cast_signed();
-        let change = words.integer()?;
-        let verdict = words.one_of(&Verdict::ALL, |verdict| verdict as u64)?;
-        let [hole_m, hole_sd_m] = words.numbers()?;
-        let cause = words.one_of(&Cause::ALL, |cause| cause as u64);
-        let [hole_x_m, hole_arc_m] = words.numbers()?;
-        let figures = words.numbers().zip(cause);
-        let silent = words.integer().and_then(|bits| u8::try_from(bits).ok()).map(HeadSet::from_bits);
-        let causes = words.integer().and_then(|bits| u16::try_from(bits).ok()).map(Causes::from_bits);
-        let again_mps = words.number().unwrap_or(0.0);
-        let cause = figures.map(|([speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m], cause)| {
-            let silent_heads = silent.unwrap_or_default();
-            let causes = causes.unwrap_or(Causes::of(cause));
-            let again = Again::of(&Failing { causes, again_mps });
-            CauseFigures {
-                causes,
-                speed_mps,
-                t_y_m,
-                middle_t_y_m,
-                missing_share,
-                again,
-                swing_m,
-                silent_heads,
-            }
-        });
-        let judged = Judged { at, section, change, verdict, hole_m, hole_sd_m, hole_x_m, hole_arc_m, cause };
-        self.wall.judge(section, verdict);
-        let (shown, said) = self.sections.judge(&judged, &self.site, self.v_max_mps);
+    fn section(&mut self, judged: &SectionJudgement, made: &mut Outbox<'_>) {
+        self.wall.judge(judged.index, judged.verdict);
+        let (shown, said) = self.sections.judge(judged, &self.site, self.v_max_mps);
         made.push(Topic::Sections, &shown);
         for line in &said {
             made.push(Topic::Alerts, line);
         }
-        Some(())
     }
 
     fn advice(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {

@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use headrace_coverage::{Judgement, RunChange};
+use headrace_coverage::{Cause, Judgement, RunChange, Verdict};
 use headrace_geometry::tunnel::shapes;
 use headrace_monitor::head_descriptions::HeadDescriptions;
 use serde_json::Value;

@@ -1,15 +1,18 @@
-//! Sections in the report.
+//! One section as read by outsiders. The report, the page and the tables are encodings of this row.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use super::spread::{SpreadReport, spread_report};
-use crate::run::Loop;
+use crate::report::SpreadReport;
 use headrace_coverage::{Evidence, Section, Sections, Unsure, Verdict};
 use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
 
 /// One section.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SectionReport {
+pub struct SectionRow {
+    /// Chainage of the section's start, as a multiple of the section length.
+    #[serde(skip)]
+    pub index: i64,
     /// Beginning, m.
     pub start_m: f64,
     /// End, m.
@@ -46,13 +49,18 @@ pub struct SectionReport {
     /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
     /// `pass`, `fail`, `cannot_say` or `open`.
-    pub verdict: &'static str,
+    #[serde(serialize_with = "verdict_word")]
+    pub verdict: Verdict,
+    /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
+    #[serde(skip)]
+    pub settled: bool,
     /// Whether the section is open although further driving won't change it.
     ///
     /// The vehicle began or turned back there, so not all heads have passed the section.
     pub not_inspected: bool,
-    /// Reason for `cannot_say`; `None` with other verdicts.
-    pub cannot_say: Option<&'static str>,
+    /// Reason for `cannot_say`, or `NotInspected`, which the report leaves to `not_inspected`.
+    #[serde(serialize_with = "reason_word")]
+    pub cannot_say: Option<Unsure>,
     /// Evidence for the cause; `None` unless the verdict is `fail`.
     pub cause: Option<Evidence>,
     /// Time at which the section was flagged, seconds on the log's clock.
@@ -82,42 +90,57 @@ pub struct DeviationReport {
     pub contradicts: bool,
 }
 
-pub(super) fn section_report(
-    sections: &Sections,
-    index: i64,
-    section: &Section,
-    dive: &Loop,
-) -> SectionReport {
-    let (start_m, end_m) = sections.bounds_m(index);
-    let profile = &dive.mission().profile;
-    let area_m2 = profile.perimeter_m() * sections.section_m();
-    SectionReport {
-        start_m,
-        end_m,
-        hole_m: section.hole.map(|hole| hole.diameter_m),
-        hole_least_m: section.hole.map(|hole| hole.least_m),
-        hole_most_m: section.hole.map(|hole| hole.most_m).filter(|most_m| most_m.is_finite()),
-        hole_bounded: section.hole.is_some_and(|hole| hole.bounded),
-        hole_sd_m: section.hole_sd_m,
-        hole_x_m: section.hole.map(|hole| hole.x_m),
-        hole_arc_m: section.hole.map(|hole| hole.arc_m),
-        hole_clock: section.hole.map(|hole| profile.clock(hole.arc_m)),
-        t_x: spread_report(&section.t_x_m),
-        t_y: spread_report(&section.t_y_m),
-        t: spread_report(&section.t_m),
-        samples: section.samples,
-        density_perm2: f64::from(section.samples) / area_m2,
-        deviation: deviation_report(section),
-        masked_share: section.masked_share,
-        verdict: section.verdict.as_str(),
-        not_inspected: section.not_inspected,
-        cannot_say: section.unsure().filter(|why| *why != Unsure::NotInspected).map(Unsure::as_str),
-        cause: section.evidence.filter(|_| section.verdict == Verdict::Fail),
-        flagged_s: section.flagged.map(MonoNs::as_secs_f64),
-        cleared_s: section.cleared.map(MonoNs::as_secs_f64),
-        doubtful_returns: section.doubtful,
-        suspect: section.suspect,
+impl SectionRow {
+    /// Row of the section with this index, or `None` if there is no such section. `profile` is the tunnel's design.
+    pub(super) fn of(sections: &Sections, index: i64, profile: &Profile) -> Option<Self> {
+        let section = sections.get(index)?;
+        let (start_m, end_m) = sections.bounds_m(index);
+        let area_m2 = profile.perimeter_m() * sections.section_m();
+        Some(Self {
+            index,
+            start_m,
+            end_m,
+            hole_m: section.hole.map(|hole| hole.diameter_m),
+            hole_least_m: section.hole.map(|hole| hole.least_m),
+            hole_most_m: section.hole.map(|hole| hole.most_m).filter(|most_m| most_m.is_finite()),
+            hole_bounded: section.hole.is_some_and(|hole| hole.bounded),
+            hole_sd_m: section.hole_sd_m,
+            hole_x_m: section.hole.map(|hole| hole.x_m),
+            hole_arc_m: section.hole.map(|hole| hole.arc_m),
+            hole_clock: section.hole.map(|hole| profile.clock(hole.arc_m)),
+            t_x: SpreadReport::from(&section.t_x_m),
+            t_y: SpreadReport::from(&section.t_y_m),
+            t: SpreadReport::from(&section.t_m),
+            samples: section.samples,
+            density_perm2: f64::from(section.samples) / area_m2,
+            deviation: deviation_report(section),
+            masked_share: section.masked_share,
+            verdict: section.verdict,
+            settled: section.settled,
+            not_inspected: section.not_inspected,
+            cannot_say: section.unsure(),
+            cause: section.evidence.filter(|_| section.verdict == Verdict::Fail),
+            flagged_s: section.flagged.map(MonoNs::as_secs_f64),
+            cleared_s: section.cleared.map(MonoNs::as_secs_f64),
+            doubtful_returns: section.doubtful,
+            suspect: section.suspect,
+        })
     }
+
+    /// Whether the section is flagged at present.
+    pub fn is_flagged(&self) -> bool {
+        self.flagged_s.is_some() && self.cleared_s.is_none()
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn verdict_word<S: Serializer>(verdict: &Verdict, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(verdict.as_str())
+}
+
+#[expect(clippy::ref_option, reason = "serde's signature")]
+fn reason_word<S: Serializer>(reason: &Option<Unsure>, to: S) -> Result<S::Ok, S::Error> {
+    reason.filter(|reason| *reason != Unsure::NotInspected).map(Unsure::as_str).serialize(to)
 }
 
 fn deviation_report(section: &Section) -> Option<DeviationReport> {
