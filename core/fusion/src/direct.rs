@@ -50,7 +50,7 @@ struct TetherTrack {
     readings: [(MonoNs, f64); SPEED_READINGS],
     count: usize,
     resolution_m: f64,
-    /// Number of restarts of the counter before its first reading here.
+    /// Restart number in the counter's first reading. A later number means that the counter has restarted since.
     restarts: u32,
 }
 

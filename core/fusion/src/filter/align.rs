@@ -21,7 +21,7 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
 
-/// Alignment time.
+/// Duration of the alignment.
 pub const LISTENS: DurNs = DurNs(1_000_000_000);
 /// Maximum number of echoes per echosounder, of which the median is used.
 const ECHOES: usize = 9;
@@ -288,7 +288,8 @@ mod tests {
 
     /// Repeated readings of cable and compass add no information.
     ///
-    /// The chainage stays as uncertain as slack and scale, and the yaw stays as uncertain as the compass deviation.
+    /// The chainage stays as uncertain as slack and scale make it. The yaw stays as uncertain as the compass
+    /// deviation makes it.
     #[test]
     fn repeated_readings_after_alignment_add_no_information() {
         let context = Context {

@@ -56,7 +56,7 @@ impl Default for NoiseLevel {
 ///
 /// The declared tilt noise of an inertial unit covers its slow errors, which differences do not show. The declared
 /// range noise of a head also covers bumps and shape of the wall, which a leaning beam would confuse with yaw. So
-/// differences can only raise a head's level. The square of its total residual lowers it
+/// differences can only raise a head's level. Only the square of the total residual can lower it
 /// ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
@@ -177,7 +177,7 @@ mod tests {
     /// If the wall differs from its design, neighbouring ranges have about equal errors, so their differences show
     /// nothing.
     #[test]
-    fn wall_that_differs_in_shape_is_not_smooth() {
+    fn wall_that_differs_from_its_design_is_not_smooth() {
         near(level(2000, |_| 1.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |_| 3.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |k| math::sin(f64::from(k) / 40.0), true).smoothness().unwrap(), 0.5);

@@ -37,7 +37,7 @@ const KNOTS: usize = 256;
 const MEMORY_S: f64 = 40.0;
 /// Limit at which a third difference is clipped, as a multiple of the rms. Faults are rare and large; slack is not.
 const MOST_SDS: f64 = 3.0;
-/// Margin of the noise when a mean square is compared with it, in standard deviations of the mean square.
+/// Margin added to the noise before it is subtracted from a mean square, in standard deviations of the mean square.
 ///
 /// A margin is needed because the mean comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
@@ -52,13 +52,13 @@ const LEVELS_S: f64 = 100.0;
 const MOST_OFF_RAD: f64 = 0.3;
 /// Maximum size of a third difference at which counter and inertial motion agree, in multiples of the usual size.
 ///
-/// Agreement is judged from `FEW` differences on. From `ENOUGH` differences on, their usual size counts as known.
+/// Agreement is judged once there are `FEW` differences. Once there are `ENOUGH`, their usual size counts as known.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
 /// Until the first comparison, slack is assumed to be faster than declared by this factor.
 const AT_FIRST: f64 = 2.0;
-/// Third differences up to `AGREES_SDS` times this are usual, m. A lever arm or a tilting vehicle causes them.
+/// Third differences up to `AGREES_SDS` times this are always usual, m. A lever arm or a tilting vehicle causes them.
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
@@ -77,7 +77,7 @@ pub(super) const MOST_REACH_M: f64 = 0.15;
 #[derive(Debug, Clone)]
 pub(super) struct SlackEstimate {
     attitude: Option<Rot<Tunnel, Body>>,
-    /// Inertial position and velocity along the tunnel, up to a constant each.
+    /// Inertial position and velocity along the tunnel, each up to an unknown constant.
     way_m: f64,
     speed_mps: f64,
     /// Inertial positions within the last epoch.
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn motion_of_a_stuck_counter_counts_as_unusual_within_1_s() {
+    fn readings_of_a_stuck_counter_count_as_unusual_within_1_s() {
         let sticks = |t: f64| {
             if (60.0..70.0).contains(&t) {
                 -0.2 * (t - 60.0)

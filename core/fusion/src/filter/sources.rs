@@ -14,7 +14,7 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 /// Limits for a stuck head.
 ///
 /// At least this many returns have the same range although the expected range varies by more than `VARIES_M`. The
-/// expected ranges must be certain to `SURE_M`, standard deviation. A low limit is safe, because a return that is
+/// standard deviation of the expected ranges must be at most `SURE_M`. A low limit is safe, because a return that is
 /// dropped by mistake costs nothing.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
@@ -142,8 +142,8 @@ impl Source {
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since the last reading that was put into the window. If so, this reading is the
-    /// new last.
+    /// Whether `period` has passed since the last reading that was put into the window. If so, this reading becomes
+    /// the last one.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {

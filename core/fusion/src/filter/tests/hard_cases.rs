@@ -391,8 +391,8 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// The advice to stand still ends once the bias is known, within the time stated at first. The advice does not
-/// return.
+/// The advice to stand still ends once the bias is known, within the time that it stated at first. The advice does
+/// not return.
 #[test]
 fn stand_still_advice_ends_once_the_bias_is_known() {
     let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };
