@@ -189,10 +189,9 @@ impl Advisor {
     /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. It propagates the phases
     /// to each tested speed. `left_s` is the remaining time, if known.
     ///
-    /// Heads apart along the hull keep their phases only in some intervals of speed. The result is the upper end of
-    /// the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
-    /// Source: docs/decisions/0005-advice-and-plan.md.
-    /// Allocates: never.
+    /// Heads that are apart along the hull keep their phases only in some intervals of speed. The result is the upper
+    /// end of the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
+    /// Source: docs/decisions/0005-advice-and-plan.md. Allocates: never.
     pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
         let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };
         if situation.heads.iter().all(Option::is_none) {
@@ -519,7 +518,7 @@ impl Advisor {
         Some((0..FALLS).fold(bound_mps(sure.most_m()), |speed_mps, _| bound_mps(sure.at_m(speed_mps))))
     }
 
-    /// Returns the target less the margin for position errors, for the present motion of the heads.
+    /// Returns the target minus the margin for position errors, for the present motion of the heads.
     fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> RemainingTarget {
         let (even_gap_s, apart_m) = (passes.even_gap_s(), phasing.apart_m());
         RemainingTarget {
@@ -533,7 +532,7 @@ impl Advisor {
         }
     }
 
-    /// Returns the target less the margin for position errors, with the steps of another mode.
+    /// Returns the target minus the margin for position errors, with the steps of another mode.
     fn sure_in(&self, mode: usize, sure: RemainingTarget) -> RemainingTarget {
         RemainingTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }

@@ -115,10 +115,9 @@ pub struct Sector {
 /// Two heads are in step if they are at the same point of their sweeps where they pass the same place. The first
 /// head, in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s.
 /// A `speed_mps` of zero means no delay: all heads are at the same point of their sweeps, regardless of their
-/// positions along the hull.
-/// Errors: fewer than two sectors, a number that isn't one of them, a lead outside sector 0, a time that isn't above
-/// zero, a speed below zero.
-/// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.
+/// positions along the hull. Errors: fewer than two sectors, a sector number that doesn't exist, a lead outside
+/// sector 0, a time that isn't above zero, a speed below zero. Source: Jorge et al. 2021, Algorithm 1, with one name
+/// for the sector's size and 2 T / s for its period.
 pub fn in_step(
     lead: InSector,
     sector: &Sector,
@@ -260,7 +259,7 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// Spacing rule for heads apart along the hull, with starts that differ by multiples of 1/s turn.
+/// Spacing rule for heads that are apart along the hull, with starts that differ by multiples of 1/s turn.
 ///
 /// The rule relates distance, speed and turn period such that the heads' passes interleave. Heads with these start
 /// angles interfere least.

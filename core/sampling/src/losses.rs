@@ -81,14 +81,14 @@ impl LossRate {
 pub struct Sampled {
     /// Target T, m.
     pub target_m: f64,
-    /// Largest distance between neighbours of one turn, m.
+    /// Largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
     /// Perimeter of the wall, m.
     pub perimeter_m: f64,
 }
 
 impl Sampled {
-    /// Returns the number of passes over each place that replace a single pass because of lost returns.
+    /// Returns the number of passes over each place that lost returns require in place of a single pass.
     ///
     /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of two distances
     /// between passes: the one that the target allows, and the one that losses leave. It ranges from 1 without losses

@@ -116,7 +116,7 @@ impl Sounding {
 
     /// Distance to another sounding of the same head on the unrolled wall, m.
     ///
-    /// The distance is the shortest one around the perimeter. Holidays are measured by it.
+    /// The distance is the shortest one around the perimeter. The size of a holiday is measured in this way.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)

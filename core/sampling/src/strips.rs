@@ -302,7 +302,7 @@ impl Strips {
         Some(slowest_mps)
     }
 
-    /// Returns T predicted on each strip at a speed, m.
+    /// Returns the spacing T predicted on each strip at a speed, m.
     fn ts_m(
         &self,
         setting: usize,
@@ -354,7 +354,8 @@ impl Strips {
         Ok(slowest)
     }
 
-    /// Returns two limits of T for each strip: within the strip, and between the samples beside it.
+    /// Returns two upper bounds of the spacing T for each strip: one from samples within the strip, and one from the
+    /// samples on either side of it.
     ///
     /// The first is `None` if no head sees the strip. The second is `None` if the strip is not thin.
     fn limits(

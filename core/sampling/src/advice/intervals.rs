@@ -1,6 +1,6 @@
 //! Intervals of speed that meet a target.
 //!
-//! Heads apart along the hull are in phase only at some speeds, so several intervals may meet a target.
+//! Heads that are apart along the hull are in phase only at some speeds, so several intervals may meet a target.
 //!
 //! The advised speed depends on the measured heads and the vehicle's pose, not on the present speed. It is the upper
 //! end of the highest interval. If that interval vanishes while heads run out of phase, the next interval may be far

@@ -302,7 +302,7 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
     assert_eq!(Planner::new(ideal(1)).unwrap().in_line(0.5).unwrap(), None);
 }
 
-/// Heads apart along the hull are in phase only near the speed for which they were started.
+/// Heads that are apart along the hull are in phase only near the speed for which they were started.
 ///
 /// The live advice therefore differs from a plan, which may restart the heads.
 #[test]
@@ -327,7 +327,7 @@ fn heads_started_for_another_speed_lower_the_largest_speed() {
     );
 }
 
-/// The error names the configured target, not the target less position errors.
+/// The error names the configured target, not the target minus the margin for position errors.
 #[test]
 fn error_names_the_configured_target() {
     let swinging = Inspection { yaw_rate_radps: 10.0, ..vita_2(HeadLayout::PhaseShift) };

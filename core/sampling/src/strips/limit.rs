@@ -20,7 +20,7 @@ pub struct Going {
     pub swing_most_m: Option<f64>,
 }
 
-/// Inputs of T on a strip: the time between passes, and the distance between neighbours around the wall.
+/// Inputs of the spacing T on a strip: the time between passes, and the distance between neighbours around the wall.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limit {
     pub(super) gap_s: f64,
