@@ -80,7 +80,7 @@ pub struct Advisor {
     /// Largest step in each mode at the centre of the tunnel, m.
     centred_m: Vec<f64>,
     parallax_rad: f64,
-    /// Ring stride of one step, for each head that turns.
+    /// Number of ring soundings per step, for each head that turns.
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring is checked first.
     next: usize,
@@ -191,7 +191,8 @@ impl Advisor {
     ///
     /// Heads that are apart along the hull keep their phases only in some intervals of speed. The result is the upper
     /// end of the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
-    /// Source: docs/decisions/0005-advice-and-plan.md. Allocates: never.
+    /// Source: docs/decisions/0005-advice-and-plan.md.
+    /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
         let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };
         if situation.heads.iter().all(Option::is_none) {
@@ -370,7 +371,8 @@ impl Advisor {
         let driving = self.driving(phasing, passes, going, sure);
         let t_y_m = match &bound {
             Ok(bound) => bound.t_y_m,
-            // The heads have other phases at another speed, and the swing between them is smaller.
+            // At another speed, the heads have other phases and less swing between their passes, so this error is not
+            // final.
             Err(SamplingError::OffAxis { .. }) => self.now.largest_step_m(0),
             Err(why) => return Err(*why),
         };

@@ -115,9 +115,10 @@ pub struct Sector {
 /// Two heads are in step if they are at the same point of their sweeps where they pass the same place. The first
 /// head, in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s.
 /// A `speed_mps` of zero means no delay: all heads are at the same point of their sweeps, regardless of their
-/// positions along the hull. Errors: fewer than two sectors, a sector number that doesn't exist, a lead outside
-/// sector 0, a time that isn't above zero, a speed below zero. Source: Jorge et al. 2021, Algorithm 1, with one name
-/// for the sector's size and 2 T / s for its period.
+/// positions along the hull.
+/// Errors: fewer than two sectors, a sector number that doesn't exist, a lead outside sector 0, a time that isn't
+/// above zero, a speed below zero.
+/// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.
 pub fn in_step(
     lead: InSector,
     sector: &Sector,

@@ -72,7 +72,7 @@ pub struct RemainingTarget {
     pub confidence_sd: f64,
     /// Standard deviation of a hole's size as measured, m.
     pub pass_error_m: f64,
-    /// [`error_time_s`] at the measurement of `pass_error_m`, seconds.
+    /// Value of [`error_time_s`] when `pass_error_m` was measured, seconds.
     pub measured_s: f64,
     /// Time between two passes of evenly spread heads, seconds.
     pub even_gap_s: f64,

@@ -93,7 +93,7 @@ pub struct Strips {
 stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, needed, strip_of; });
 
 impl Strips {
-    /// Creates an empty list with capacity for the strips of `arcs` arcs in `settings` settings.
+    /// Creates an empty list with capacity for the strips of `arcs` arcs and for `settings` settings of the heads.
     pub fn with_room(arcs: usize, settings: usize, soundings: u32) -> Self {
         let strips = 2 * arcs + 1;
         Self {
@@ -160,7 +160,7 @@ impl Strips {
         }
     }
 
-    /// Measures the largest steps on each strip in `settings` settings of the heads.
+    /// Measures the largest steps on each strip for each of `settings` settings of the heads.
     ///
     /// `stride` returns the ring stride of a head's step by setting and head; `None` for an absent head.
     ///

@@ -72,7 +72,7 @@ pub struct CableReading {
     pub at: MonoNs,
     /// Chainage shown by the counter, m.
     pub shown_m: f64,
-    /// Shown chainage less expected chainage, m.
+    /// Shown chainage minus expected chainage, m.
     pub off_m: f64,
     /// Standard deviation of `off_m`, m.
     pub sd_m: f64,
@@ -101,7 +101,7 @@ pub enum Use {
     ///
     /// The values are these corrections of chainage and speed, m and m/s.
     Dispute([f64; 2]),
-    /// The counter runs correctly again. The value is the difference that remains: shown less expected chainage, m.
+    /// The counter runs correctly again. The value is the difference that remains: shown minus expected chainage, m.
     Slipped(f64),
     /// Give up the estimate and restart from the running counter, which may be wrong by this length, m.
     Seek(f64),

@@ -83,7 +83,7 @@ pub struct Eskf {
     pub clones: ErrorClones,
     /// Time of the last reacquisition of the chainage.
     pub way_sought: Option<MonoNs>,
-    /// Variance of the counter's possible loss during motion, m^2.
+    /// Variance of the length that the counter may have lost during motion, m^2.
     slipped_m2: f64,
     /// Number of times that the relative position of later and earlier soundings has become unknown.
     pub ties: u32,

@@ -10,7 +10,7 @@ pub(super) const FOLLOWED: usize = 12;
 pub(super) const COMPARED: u32 = 4;
 /// Minimum number of blocks for computing the uncertainty of a figure.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
-/// Standard deviations from zero above which a figure counts as certain.
+/// Number of standard deviations from zero above which a figure counts as certain.
 ///
 /// The limit for an alternative is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
 pub(super) const SURE: f64 = 6.0;

@@ -20,7 +20,7 @@ const SQUARE: f64 = 0.8;
 pub struct ScalarUpdate {
     /// Change of the expected value per unit of each error.
     pub h: Errors,
-    /// Measured value less expected value.
+    /// Measured value minus expected value.
     pub residual: f64,
     /// Variance of the measurement noise.
     pub noise: f64,
@@ -115,7 +115,7 @@ impl ScalarUpdate {
 const LEAST_COSINE: f64 = 0.5;
 /// Minimum distance that is assumed for the curvature of the wall, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// Standard deviations from zero above which an inclination counts as certain.
+/// Number of standard deviations from zero above which an inclination counts as certain.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.

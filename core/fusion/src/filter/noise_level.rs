@@ -40,7 +40,7 @@ pub struct NoiseLevel {
     /// Running mean of the normalised squares of all innovations, and the number of these innovations.
     nis: f64,
     seen: u32,
-    /// Running mean of squared innovations less the estimate's own variance, as a share of the declared variance.
+    /// Running mean of squared innovations minus the estimate's own variance, as a share of the declared variance.
     share: f64,
     /// The same mean over the last few measurements, which shows changes of the wall.
     latest: f64,
@@ -91,7 +91,7 @@ impl NoiseLevel {
         nis / usual
     }
 
-    /// Processes a squared innovation less the estimate's own variance, as a share of the declared variance.
+    /// Processes a squared innovation minus the estimate's own variance, as a share of the declared variance.
     pub fn note_share(&mut self, share: f64, is_used: bool) {
         let most = if is_used { MOST } else { MOST_UNUSED };
         let share = share.clamp(-most, most);

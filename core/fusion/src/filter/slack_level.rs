@@ -7,7 +7,8 @@
 //! that the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it
 //! uses only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
 //!
-//! With u the counter less the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant T:
+//! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant
+//! T:
 //!
 //! ```text
 //! d(L) = u(t) - 3 u(t - L) + 3 u(t - 2 L) - u(t - 3 L)
@@ -41,7 +42,7 @@ const MOST_SDS: f64 = 3.0;
 ///
 /// A margin is needed because the mean comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
-/// Time constant with which the inertial velocity decays, s. The decay limits the numbers and hardly changes a
+/// Time constant with which the inertial velocity decays, s. The decay keeps the values bounded and hardly changes a
 /// third difference.
 const FORGETS_S: f64 = 1000.0;
 /// Time constant for levelling the attitude and aligning it with the estimate's heading, s.
@@ -209,7 +210,7 @@ impl SlackEstimate {
         self.differences.clear();
     }
 
-    /// Returns the third difference of counter less inertial position, m.
+    /// Returns the third difference of counter minus inertial position, m.
     ///
     /// The second value is the spread of the counter's distances in the three lags, m.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {

@@ -52,9 +52,9 @@ pub struct Consistency {
     pub nis_sum: f64,
     /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement.
     ///
-    /// Each innovation adds two terms. The first is the NIS (clipped at the gate) less 1. The second is the
-    /// logarithm of the innovation's variance divided by the usual variance. If a log is interpreted in two ways,
-    /// the interpretation with the lower value is more likely.
+    /// Each innovation adds two terms. The first is the NIS (clipped at the gate) minus 1. The second is the
+    /// logarithm of the innovation's variance divided by the usual variance. If a log is interpreted in two ways, the
+    /// interpretation with the lower value is more likely.
     pub surprise: f64,
 }
 
@@ -119,7 +119,7 @@ impl Source {
 
     /// Processes a head's range; returns whether the head reports the same range in every direction.
     ///
-    /// Inputs: the range less the expected range, m, and the standard deviation of the expected range, m. While the
+    /// Inputs: the range minus the expected range, m, and the standard deviation of the expected range, m. While the
     /// estimate is uncertain, returns `false`.
     pub fn says_one_range(&mut self, reading: &Reading, residual_m: f64, estimate_sd_m: f64) -> bool {
         let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = reading else { return false };

@@ -34,7 +34,8 @@ pub(super) struct Driving<'a> {
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: RemainingTarget,
-    /// Remaining target at unlimited speed, and the heads' distance along the hull, m.
+    /// Target that remains after the position margin at unlimited speed, and the distance between the heads along the
+    /// hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
     /// Speed above which no phase meets the target, m/s.
@@ -73,7 +74,7 @@ impl Driving<'_> {
     ///
     /// At the given speed v, passes are g = `gap_s` apart in time. At a lower speed u, heads at most a apart along
     /// the hull shift by up to a (1 / u - 1 / v) in time relative to each other. The longest gap is then at least g
-    /// less that shift, so its length is at least u g - a (1 - u / v).
+    /// minus that shift, so its length is at least u g - a (1 - u / v).
     fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
         /// Allowance for rounding.
         const A_LITTLE: f64 = 1e-9;

@@ -144,7 +144,7 @@ fn required_passes_grow_continuously_with_losses() {
 }
 
 #[test]
-fn no_extra_passes_without_losses_or_without_a_speed() {
+fn no_extra_passes_are_needed_without_losses_or_a_possible_speed() {
     assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
     // If steps are longer than the target, no speed meets the target.

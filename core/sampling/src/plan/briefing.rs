@@ -23,7 +23,7 @@ pub struct Briefing {
     pub strips: Vec<ThinStrip>,
     /// Start of each head.
     pub starts: Vec<Start>,
-    /// Spacing rule for heads that are apart along the hull that start at equal angles.
+    /// Spacing rule for heads that are apart along the hull and start at equal angles.
     pub hull_rules: Vec<HullAdvice>,
     /// Pairs of heads that can receive each other's pings.
     pub exposures: Vec<Heard>,

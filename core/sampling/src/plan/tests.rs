@@ -83,7 +83,7 @@ fn t_max_at_the_largest_speed_equals_the_target() {
 ///
 /// The planner takes the worst start angle of the pings, so its T_max is at most slightly larger.
 #[test]
-fn ideal_heads_give_the_reference_table() {
+fn ideal_heads_have_the_t_max_of_the_reference_table() {
     let expected = [
         [4.259, 2.132, 1.069],
         [2.134, 1.074, 0.548],
@@ -167,7 +167,7 @@ fn plan_gives_the_speed_for_a_target_or_the_target_for_a_time() {
 }
 
 #[test]
-fn impossible_plan_names_the_cause() {
+fn error_about_an_impossible_plan_names_the_cause() {
     let why = |inspection| Planner::new(inspection).unwrap_err();
     assert_eq!(why(ideal(0)), SamplingError::HeadCount { heads: 0 });
     let one = Inspection { layout: HeadLayout::SectorOffset, ..ideal(1) };

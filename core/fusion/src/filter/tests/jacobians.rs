@@ -100,7 +100,7 @@ fn moved(state: &State, error: usize, by: f64) -> State {
 
 /// Checks a row against central differences of its residual.
 ///
-/// The expected value is the measured value less the residual.
+/// The expected value is the measured value minus the residual.
 fn check_row(
     what: &str,
     state: &State,
