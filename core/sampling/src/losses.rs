@@ -17,7 +17,7 @@ use headrace_geometry::math;
 ///
 /// The share [`MAY_FAIL`] of such stretches may fail because of lost returns.
 const STRETCH_M: f64 = 0.25;
-/// Share of stretches that may fail: 95 in 100 stretches pass.
+/// Share of stretches that may fail. The other 95 in 100 meet the target.
 const MAY_FAIL: f64 = 0.05;
 /// Maximum number of passes.
 ///

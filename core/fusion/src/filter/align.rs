@@ -27,7 +27,7 @@ pub const LISTENS: DurNs = DurNs(1_000_000_000);
 const ECHOES: usize = 9;
 /// Initial standard deviations, in the order below.
 ///
-/// - Position in the section with echoes, and without.
+/// - Position in the cross-section with echoes, and without.
 /// - Chainage without a cable reading.
 /// - Yaw without a compass. The vehicle is then assumed to face along the tunnel.
 /// - Velocity.
@@ -134,7 +134,7 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // After a silence, the other sensors may also have returned only now. So the alignment starts here.
+            // After a silence, the other sensors may also have begun to send only now. So the alignment starts here.
             self.since = Some(at);
         }
     }

@@ -1,8 +1,8 @@
 //! Decides whether cable counter and estimate agree.
 //!
-//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are
-//! kept. The counter's readings are withheld, and the inertial unit alone carries the chainage. The chainage is as
-//! uncertain as the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
+//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are kept.
+//! The counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the
+//! chainage equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
 //! estimate disagree".
 
 use serde::{Deserialize, Serialize};
@@ -42,7 +42,7 @@ const MISSING_M: f64 = 0.02;
 /// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
 const SAME_M: f64 = 0.01;
-/// Additional share while the vehicle's own distance is uncertain.
+/// Additional share while the estimated distance of the vehicle is uncertain.
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
@@ -112,7 +112,7 @@ pub enum Use {
 pub struct Cable {
     /// The last reading.
     last: Option<CableReading>,
-    /// The last reading that has another count than the previous reading.
+    /// The last reading whose count differs from the previous one.
     changed: Option<CableReading>,
     /// The first of the present series of readings beyond the gate.
     left: Option<CableReading>,
@@ -387,7 +387,7 @@ mod tests {
 
     /// The tolerance is a tenth of the distance plus a centimetre.
     ///
-    /// While the vehicle's own distance is uncertain, it is four tenths of the distance plus a centimetre.
+    /// While the estimated distance of the vehicle is uncertain, it is four tenths of the distance plus a centimetre.
     #[test]
     fn dispute_ends_as_a_slip_once_counter_and_vehicle_speeds_match() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [

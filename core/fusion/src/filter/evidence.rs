@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Maximum number of range sources that are followed.
+/// Maximum number of range sources whose settings are checked.
 pub(super) const FOLLOWED: usize = 12;
 /// Out of this many readings, one is compared with its alternatives, because each comparison costs a ray.
 pub(super) const COMPARED: u32 = 4;

@@ -63,7 +63,7 @@ const AT_FIRST: f64 = 2.0;
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// Size of third differences over a second above which slack constantly moves the counter, in counter steps.
+/// Size of third differences at a lag of 1 s, in counter steps, above which slack moves the counter constantly.
 const LIVELY_STEPS: f64 = 4.0;
 /// Time between two comparisons of the averages with the model.
 const COMPARES: DurNs = DurNs(1_000_000_000);

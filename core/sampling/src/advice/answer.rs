@@ -11,7 +11,7 @@ const MODE_NAME_BYTES: usize = 15;
 /// The limiting factor of the advice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
-    /// The distance between passes is the limit: a lower speed helps.
+    /// The distance between passes is the limit, so a lower speed helps.
     HelixPitch,
     /// A lower speed does not help, but another mode or position, or a steadier vehicle would.
     ///

@@ -5,7 +5,7 @@ use super::search::SPEED_MARGIN;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Less restrictive advice is displayed once no more restrictive advice has occurred for this time.
+/// Length of the past period whose most restrictive advice is displayed.
 const HOLD: DurNs = DurNs(1_000_000_000);
 /// Time for which a higher speed must last before it is displayed.
 ///

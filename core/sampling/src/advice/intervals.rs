@@ -115,8 +115,8 @@ impl Driving<'_> {
 
     /// Returns the speed reduced by the margin [`SPEED_MARGIN`], or by up to twice that margin.
     ///
-    /// The larger margin applies where T grows faster than the speed, because the heads run out of phase. A speed
-    /// error of 1 % then costs more than 1 % of T.
+    /// The larger margin applies where the spacing T grows faster than the speed, because the heads run out of phase.
+    /// A speed error of 1 % then costs more than 1 % of T.
     pub(super) fn kept_back_mps(&self, fastest_mps: f64) -> f64 {
         const STEEP: f64 = 2.0 * SPEED_MARGIN;
         let meets = |speed_mps: f64| self.meets(speed_mps, 0.0);
@@ -130,7 +130,8 @@ impl Driving<'_> {
         less_mps.min(search::kept_back_mps(fastest_mps, 1.0 - edge_mps / fastest_mps / (1.0 + STEEP), meets))
     }
 
-    /// Returns the best speed near the previous result; `None` if T there exceeds the target by over [`EASE`].
+    /// Returns the best speed near the previous result; `None` if the spacing T there exceeds the target by over
+    /// [`EASE`].
     fn kept_mps(&self, last_mps: f64) -> Option<f64> {
         let near = (-TRIED..=TRIED).map(|k| last_mps * (1.0 + TRIED_SHARE * f64::from(k)));
         let best =

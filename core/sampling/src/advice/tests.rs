@@ -574,7 +574,7 @@ fn nearest_and_highest_speed_intervals_are_advised() {
 ///
 /// A vehicle 2 % above the advised speed then exceeds the target by at most 2 %.
 #[test]
-fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
+fn speed_margin_is_larger_where_the_spacing_grows_faster_than_speed() {
     let (mut even, mut steep) = (0, 0);
     for (apart_m, k) in
         [0.0, 0.3, 1.1, 2.5].into_iter().flat_map(|apart_m| (0..40).map(move |k| (apart_m, k)))

@@ -78,7 +78,7 @@ fn along_m(t_y_m: f64, passes: f64) -> f64 {
 }
 
 #[test]
-fn required_passes_let_19_of_20_stretches_pass() {
+fn required_passes_leave_no_hole_in_19_of_20_stretches() {
     let rates = [
         LossRate::independent(0.02),
         LossRate::independent(0.1),
@@ -98,7 +98,7 @@ fn required_passes_let_19_of_20_stretches_pass() {
 }
 
 #[test]
-fn too_few_passes_let_fewer_than_9_in_10_stretches_pass() {
+fn too_few_passes_leave_holes_in_over_1_in_10_stretches() {
     let rates =
         [LossRate::independent(0.2), LossRate::independent(0.5), LossRate { share: 0.2, after_lost: 0.8 }];
     for t_y_m in [0.07, 0.1] {

@@ -413,7 +413,7 @@ fn stand_still_advice_ends_once_the_bias_is_known() {
     assert!(asked[begun + 31..].iter().all(|asked_s| *asked_s == 0), "{asked:?}");
 }
 
-/// Returns the largest relative increase of the sd between passes after the tenth minute, once per round.
+/// Returns the largest relative increase of the sd between passes after the tenth minute, sampled once per round.
 fn change_over_hours(hours: u32) -> f64 {
     let rig = Rig { imu_s: 0.1, ..Rig::new(rounds, 1) };
     let mut nav = rig.navigation();
