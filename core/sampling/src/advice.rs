@@ -31,7 +31,7 @@ pub use search::SPEED_MARGIN;
 /// Maximum number of modes per head for which alternatives are computed.
 pub const MAX_MODES: usize = 8;
 
-/// Number of advice updates per recomputation of the alternatives.
+/// The alternatives are recomputed once per this number of advice updates.
 const ALTERNATIVES_EVERY: u32 = 25;
 /// Number of iterations that solve for the speed and its position margin, each of which depends on the other.
 const FALLS: u32 = 3;

@@ -73,7 +73,7 @@ impl Turn {
 pub enum Basis {
     /// Measured on this head at this range setting, from the vehicle file.
     Measured,
-    /// The manufacturer's table, at its range setting.
+    /// Taken from the manufacturer's table, at the table's range setting.
     Table,
     /// Estimated from another range setting.
     Estimated,

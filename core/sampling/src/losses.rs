@@ -27,7 +27,8 @@ pub const MOST_PASSES: f64 = 10.0;
 const HARDLY: f64 = 1e-3;
 /// Share of a hole's diameter, along and around the tunnel, that lost passes and pings must cover.
 const INNER: f64 = 0.7;
-/// Upper limit of the share of lost returns: a head that receives one ping in a thousand receives nothing.
+/// Upper limit of the share of lost returns. In practice, a head that receives one ping in a thousand receives
+/// nothing.
 const MOST_SHARE: f64 = 0.999;
 
 /// Rate at which a head's pings lose their returns by chance.

@@ -198,7 +198,7 @@ impl Phasing {
         share
     }
 
-    /// Returns the heads with the phases of a schedule of `scheduled` heads for `planned_mps`.
+    /// Returns this phasing, but with the phases that a schedule of `scheduled` heads for `planned_mps` gives.
     ///
     /// A speed of zero means a schedule that ignores positions along the hull. Heads in sectors or out of step keep
     /// their phases.

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn speed_for_a_target_gives_back_the_target() {
+    fn spacing_at_the_speed_for_a_target_equals_the_target() {
         let v = speed_for_target_mps(0.5, 0.12, 2.0, 0.02).unwrap();
         assert!((t_max_m(v * 2.0, v * 0.02, 0.12) - 0.5).abs() < 1e-12);
         assert_eq!(speed_for_target_mps(0.5, 0.5, 2.0, 0.02), None);

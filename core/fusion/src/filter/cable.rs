@@ -389,7 +389,7 @@ mod tests {
     ///
     /// While the estimated distance of the vehicle is uncertain, it is four tenths of the distance plus a centimetre.
     #[test]
-    fn dispute_ends_as_a_slip_once_counter_and_vehicle_speeds_match() {
+    fn counter_counts_as_slipped_once_its_speed_matches_the_vehicle_again() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [
             (1.0, 0.1, 0.0, 1.0, -0.4),
             (1.0, 0.2, 0.0, 1.0, -0.4),

@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn diverging_estimate_is_reported_unless_the_filter_reports_it() {
+    fn diverging_estimate_is_reported_unless_the_filter_itself_reports_a_dispute() {
         let runs = |t: f64| Some(way_m(t) + 0.5 * (t - 60.0).max(0.0));
         let (first_s, doubt) = compared(70, way_m, |_| None, runs);
         assert!((61.0..63.0).contains(&first_s.unwrap()), "{first_s:?}");

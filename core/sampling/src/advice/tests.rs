@@ -442,7 +442,7 @@ fn target_is_met_in_the_speed_interval_and_missed_below_it() {
     assert!(t_at(0.985 * from) > 1.0, "{}", t_at(0.985 * from));
 }
 
-/// None of the speeds that a failed test rules out meets the target.
+/// No speed that a failed test rules out meets the target.
 ///
 /// The heads are anywhere along the hull and side by side, with hidden wall, swing and position errors.
 #[test]

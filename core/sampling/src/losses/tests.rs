@@ -111,7 +111,7 @@ fn too_few_passes_leave_holes_in_over_1_in_10_stretches() {
 }
 
 #[test]
-fn passes_of_a_silent_head_are_replaced_by_other_heads() {
+fn other_heads_make_up_for_the_passes_of_a_silent_head() {
     let sound = LossRate::default();
     let deaf = LossRate::independent(1.0);
     assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
