@@ -14,12 +14,12 @@ const NOTHING_M: f64 = 0.002;
 const LEFT_SHARE: f64 = 0.6;
 /// Maximum share of the target that the margin takes.
 const MOST_SHARE: f64 = 0.2;
-/// Share of the time between heads that are apart along the hull that counts towards the time between passes.
+/// Share of the time between heads that are apart along the hull. It counts towards the time between passes.
 ///
-/// Only some neighbouring passes are by heads apart, and holes between these passes grow by less than the heads'
+/// Only some neighbouring passes are by such heads, and holes between these passes grow by less than the heads'
 /// separation. With this share, a hole's size D is within two of its standard deviations 93 % of the time, over the
-/// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share of
-/// 0, and 99 % with a share of 1.
+/// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share
+/// of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;

@@ -7,7 +7,7 @@ use headrace_geometry::math;
 /// T_max, m: the longer diagonal of the parallelogram of four neighbouring samples.
 ///
 /// `t_x_m` is the distance between passes, `advance_m` (d) the distance travelled between two pings, and `t_y_m` the
-/// largest distance between neighbours within a turn. All arguments are finite.
+/// largest distance between neighbouring samples of one turn. All arguments are finite.
 /// Source: Jorge et al. 2021, Eq. 16.
 pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     math::hypot(t_x_m + advance_m, t_y_m)

@@ -13,8 +13,8 @@ use headrace_geometry::math;
 ///
 /// They are kept for a while because a counter fails some time before the failure is noticed.
 const RECENT_S: f64 = 1.0;
-/// Minimum time after which an unchanged count is a stop of the vehicle, s. Shorter pauses may come from slow motion
-/// and coarse steps.
+/// Minimum time after which an unchanged count means a stop of the vehicle, s. Shorter pauses may come from slow
+/// motion and coarse steps.
 const STANDS_S: f64 = 2.0;
 /// Standard deviation of the possible loss, as a share of the corrections.
 ///

@@ -296,7 +296,8 @@ impl<const N: usize> Factors<N> {
 
     /// Whether no variance is negative.
     ///
-    /// True for any sequence of changes. Numbers that are no longer finite pass; [`Self::is_sound`] detects them.
+    /// This holds after any sequence of changes. Numbers that are no longer finite pass; [`Self::is_sound`] detects
+    /// them.
     pub fn has_variances(&self) -> bool {
         self.d.iter().all(is_variance)
     }

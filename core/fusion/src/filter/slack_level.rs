@@ -123,7 +123,7 @@ impl SlackEstimate {
 
     /// Whether slack constantly moves a counter that has this step, m.
     ///
-    /// On average, third differences over a second then exceed [`LIVELY_STEPS`] steps and the noise.
+    /// On average, third differences at a lag of 1 s then exceed [`LIVELY_STEPS`] steps and the noise.
     pub(super) fn is_lively(&self, step_m: f64, noises: Noises, settings: &Settings) -> bool {
         let least_m = LIVELY_STEPS * step_m;
         self.squares_m2[1] > (least_m * least_m).max(noises.third_square_m2(1.0, settings))

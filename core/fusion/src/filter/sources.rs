@@ -19,7 +19,7 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Minimum time between used attitudes, because their errors are correlated over a longer time.
+/// Minimum time between used attitudes. Their errors stay correlated for longer than this.
 ///
 /// The same applies to cable readings and depths.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);

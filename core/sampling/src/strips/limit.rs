@@ -48,8 +48,8 @@ impl Limit {
 
     /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).
     ///
-    /// t is the sum of gap and ping period, w the swing speed, u the swing speed between heads apart, and a their
-    /// distance.
+    /// t is the sum of gap and ping period, w the swing speed, u the swing speed between heads that are apart along
+    /// the hull, and a their distance.
     ///
     /// Two other limits may allow a higher speed, which is then the result: the largest displacement by swing between
     /// passes, and the circle between two rows of turning points.

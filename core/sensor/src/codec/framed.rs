@@ -47,8 +47,8 @@ pub trait Framing: Copy {
 ///
 /// `N` is the maximum frame length; a candidate that needs more bytes is bad. On a byte stream, scanning resumes at
 /// the second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame is
-/// skipped, and does not count as a bad frame. In a whole message, all bytes from the first that is not part of a
-/// frame count as one bad frame. Apparent frames among these bytes are ignored.
+/// skipped, and does not count as a bad frame. In a whole message, all bytes from the first one outside a frame to
+/// the end count as one bad frame. Apparent frames among these bytes are ignored.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]

@@ -19,8 +19,9 @@ const STATES: u64 = 300;
 const GRAVITY_MPS2: f64 = 9.81;
 /// Step of the central differences.
 ///
-/// The truncation error is about the square of the step: 1e-8 for numbers near one. The rounding error is about 1e-16
-/// / 1e-4 times the numbers. The numbers reach some hundreds of metres, so the rounding error is 1e-10.
+/// The truncation error is about the square of the step: 1e-8 for numbers near one. The rounding error is about 1e-12
+/// times the numbers, which is the rounding of a double divided by the step. The numbers reach some hundreds of
+/// metres, so the rounding error is 1e-10.
 const STEP: f64 = 1e-4;
 /// Tolerance that covers both errors with a margin. A wrong sign or a missing term causes an error of at least
 /// 0.01.

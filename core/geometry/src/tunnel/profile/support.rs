@@ -1,4 +1,4 @@
-//! Extent of a profile with many elements in any direction, bounded by a table.
+//! Table that bounds the extent of a profile with many elements in any direction.
 
 use super::plane::{Yz, dot, norm};
 use crate::math::{self, TAU};

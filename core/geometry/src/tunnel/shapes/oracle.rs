@@ -49,7 +49,7 @@ fn rays_nearly_along_the_wall_agree_with_50_digit_values() {
 }
 
 #[test]
-fn rays_through_and_an_ulp_beside_corners_agree_with_50_digit_values() {
+fn rays_through_corners_and_an_ulp_beside_them_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("corner");
     assert_eq!(count, 36);
     found("geometry.corner", range_m.max(arc_m), 1e-14);
