@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Ranges that differ by less than this count as equal, m.
 ///
-/// The limit is finer than a profiling sonar's resolution, so that noise alone separates the ranges of a wall.
+/// The limit is finer than a profiling sonar's resolution, so the noise of ranges to a real wall exceeds it.
 const SAME_M: f64 = 0.002;
 
 /// A run of returns with the same range, and the spread of the design range along the run.
@@ -13,7 +13,7 @@ const SAME_M: f64 = 0.002;
 pub struct ConstantRange {
     returns: u32,
     range_m: f64,
-    /// Minimum and maximum of the range less the design range, m.
+    /// Minimum and maximum of the range minus the design range, m.
     off_m: [f64; 2],
 }
 
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn constant_range_expected_by_the_design_and_changing_range_are_not_stuck() {
+    fn range_that_varies_or_is_constant_by_design_is_not_stuck() {
         assert!(!after((0..1000).map(|_| (1.0, 1.0))).is_stuck(8, 0.05));
         assert!(!after((0..1000).map(|k| (1.0 + 0.003 * f64::from(k), 1.0))).is_stuck(2, 0.05));
     }

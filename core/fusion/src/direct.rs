@@ -17,7 +17,7 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::{EchoRange, Level, Reading, TetherLength};
 
-/// Maximum age of ranges used for the position in the section.
+/// Maximum age of ranges used for the position in the cross-section.
 const ECHO_AGE: DurNs = DurNs(500_000_000);
 /// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
@@ -50,7 +50,7 @@ struct TetherTrack {
     readings: [(MonoNs, f64); SPEED_READINGS],
     count: usize,
     resolution_m: f64,
-    /// Number of restarts of the counter before its first reading here.
+    /// Restart number in the counter's first reading. A later number means that the counter has restarted since.
     restarts: u32,
 }
 
@@ -90,7 +90,7 @@ impl DirectNavigation {
         self.find_place(at);
     }
 
-    /// Updates the position in the section to the best fit of recent ranges to the profile.
+    /// Updates the position in the cross-section to the best fit of recent ranges to the profile.
     fn find_place(&mut self, now: MonoNs) {
         let Some((_, attitude)) = self.attitude else { return };
         let [reference_y, reference_z] = self.profile.reference();
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn four_echoes_determine_the_position_in_the_section() {
+    fn four_echoes_determine_the_position_in_the_cross_section() {
         let profile = shapes::ceran().unwrap();
         let site = Site { axis_yaw_rad: 0.3, ..Site::default() };
         let truth = Pose {

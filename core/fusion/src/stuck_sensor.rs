@@ -121,10 +121,10 @@ mod tests {
         assert!(hangs(all).iter().all(|hangs| !hangs));
     }
 
-    /// A coarse unit at rest repeats each reading for a while. The coarser the unit, the longer the detection
-    /// takes.
+    /// A coarsely quantised unit at rest repeats each reading for a while. The coarser the unit, the longer the
+    /// detection takes.
     #[test]
-    fn coarse_unit_at_rest_is_not_stuck() {
+    fn coarsely_quantised_unit_at_rest_is_not_stuck() {
         // One reading in two hundred differs. So a run of three readings is no evidence, and neither is one of two
         // thousand.
         let coarse = |k: u64| {

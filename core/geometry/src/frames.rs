@@ -207,7 +207,7 @@ impl<To, From> Rot<To, From> {
 
     /// Whether the quaternion has unit length, within the rounding errors of a long product of rotations.
     pub fn is_unit(&self) -> bool {
-        /// Limit of the squared length's error. Products of a ten-hour dive at 600 Hz stay below 1e-8.
+        /// Maximum error of the squared length. Products of a ten-hour dive at 600 Hz stay below 1e-8.
         const DRIFT: f64 = 1e-6;
         let [w, x, y, z] = self.wxyz();
         (w * w + x * x + y * y + z * z - 1.0).abs() <= DRIFT

@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn span_is_signed_and_saturates() {
+    fn duration_between_timestamps_is_signed_and_saturates() {
         assert_eq!(MonoNs(5).since(MonoNs(8)), DurNs(-3));
         assert_eq!(MonoNs(u64::MAX).since(MonoNs(0)), DurNs(i64::MAX));
         assert_eq!(MonoNs(0).since(MonoNs(u64::MAX)), DurNs(i64::MIN));

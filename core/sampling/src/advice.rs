@@ -31,7 +31,7 @@ pub use search::SPEED_MARGIN;
 /// Maximum number of modes per head for which alternatives are computed.
 pub const MAX_MODES: usize = 8;
 
-/// Number of advice updates per recomputation of the alternatives.
+/// The alternatives are recomputed once per this number of advice updates.
 const ALTERNATIVES_EVERY: u32 = 25;
 /// Number of iterations that solve for the speed and its position margin, each of which depends on the other.
 const FALLS: u32 = 3;
@@ -80,7 +80,7 @@ pub struct Advisor {
     /// Largest step in each mode at the centre of the tunnel, m.
     centred_m: Vec<f64>,
     parallax_rad: f64,
-    /// Ring stride of one step, for each head that turns.
+    /// Number of ring soundings per step, for each head that turns.
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring is checked first.
     next: usize,
@@ -189,8 +189,8 @@ impl Advisor {
     /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. It propagates the phases
     /// to each tested speed. `left_s` is the remaining time, if known.
     ///
-    /// Heads apart along the hull keep their phases only in some intervals of speed. The result is the upper end of
-    /// the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
+    /// Heads that are apart along the hull keep their phases only in some intervals of speed. The result is the upper
+    /// end of the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
     /// Source: docs/decisions/0005-advice-and-plan.md.
     /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
@@ -371,7 +371,8 @@ impl Advisor {
         let driving = self.driving(phasing, passes, going, sure);
         let t_y_m = match &bound {
             Ok(bound) => bound.t_y_m,
-            // The heads have other phases at another speed, and the swing between them is smaller.
+            // At another speed, the heads have other phases and less swing between their passes, so this error is not
+            // final.
             Err(SamplingError::OffAxis { .. }) => self.now.largest_step_m(0),
             Err(why) => return Err(*why),
         };
@@ -519,7 +520,7 @@ impl Advisor {
         Some((0..FALLS).fold(bound_mps(sure.most_m()), |speed_mps, _| bound_mps(sure.at_m(speed_mps))))
     }
 
-    /// Returns the target less the margin for position errors, for the present motion of the heads.
+    /// Returns the target minus the margin for position errors, for the present motion of the heads.
     fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> RemainingTarget {
         let (even_gap_s, apart_m) = (passes.even_gap_s(), phasing.apart_m());
         RemainingTarget {
@@ -533,7 +534,7 @@ impl Advisor {
         }
     }
 
-    /// Returns the target less the margin for position errors, with the steps of another mode.
+    /// Returns the target minus the margin for position errors, with the steps of another mode.
     fn sure_in(&self, mode: usize, sure: RemainingTarget) -> RemainingTarget {
         RemainingTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }

@@ -50,9 +50,9 @@ pub enum SamplingError {
     /// A head outside the tunnel's profile.
     #[error("a head at y = {y_m:.3} m, z = {z_m:.3} m is outside the tunnel's profile")]
     HeadOutside {
-        /// Left of the axis, m.
+        /// Position left of the axis, m.
         y_m: f64,
-        /// Above the floor's centre, m.
+        /// Height above the floor's centre, m.
         z_m: f64,
     },
     /// Sectors are impossible with fewer than two heads.
@@ -73,7 +73,7 @@ pub enum SamplingError {
     /// A planning question has no target, speed or time.
     #[error("no question: give a target, a speed or a time")]
     NothingAsked,
-    /// Heads apart along the hull have no phase for a stationary vehicle.
+    /// Heads that are apart along the hull have no phase for a stationary vehicle.
     #[error(
         "heads {apart_m} m apart along the hull have no phase at {speed_mps} m/s; it takes a speed above zero"
     )]
@@ -95,20 +95,20 @@ pub enum SamplingError {
         /// Arc length of the strip's middle, m.
         arc_m: f64,
     },
-    /// The vehicle's heading is too far off the axis, or it swings too fast.
+    /// The vehicle's heading is too far off the axis, or the vehicle swings too fast.
     #[error("no speed meets a target of {target_m} m: at this heading or swing, passes are farther apart")]
     OffAxis {
         /// The target, m.
         target_m: f64,
     },
-    /// Neighbours of one turn are as far apart as the target.
+    /// Neighbouring samples of one turn are as far apart as the target.
     #[error(
         "no speed meets a target of {target_m} m: neighbours of one turn are {t_y_m:.3} m apart, whatever the speed"
     )]
     AngularStep {
         /// The target, m.
         target_m: f64,
-        /// The largest distance between neighbours of one turn, m.
+        /// The largest distance between neighbouring samples of one turn, m.
         t_y_m: f64,
     },
 }

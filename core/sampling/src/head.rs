@@ -73,7 +73,7 @@ impl Turn {
 pub enum Basis {
     /// Measured on this head at this range setting, from the vehicle file.
     Measured,
-    /// The manufacturer's table, at its range setting.
+    /// Taken from the manufacturer's table, at the table's range setting.
     Table,
     /// Estimated from another range setting.
     Estimated,
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_turn_names_the_cause() {
+    fn error_about_an_invalid_turn_names_the_cause() {
         let why =
             |step_deg: f64, period_s| Turn::new(step_deg.to_radians(), period_s).unwrap_err().to_string();
         assert!(why(0.7, 8.0).starts_with("a step of 0.7"), "{}", why(0.7, 8.0));

@@ -116,8 +116,8 @@ pub struct Sector {
 /// head, in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s.
 /// A `speed_mps` of zero means no delay: all heads are at the same point of their sweeps, regardless of their
 /// positions along the hull.
-/// Errors: fewer than two sectors, a number that isn't one of them, a lead outside sector 0, a time that isn't above
-/// zero, a speed below zero.
+/// Errors: fewer than two sectors, a sector number that doesn't exist, a lead outside sector 0, a time that isn't
+/// above zero, a speed below zero.
 /// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.
 pub fn in_step(
     lead: InSector,
@@ -260,7 +260,7 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// Spacing rule for heads apart along the hull, with starts that differ by multiples of 1/s turn.
+/// Spacing rule for heads that are apart along the hull, with starts that differ by multiples of 1/s turn.
 ///
 /// The rule relates distance, speed and turn period such that the heads' passes interleave. Heads with these start
 /// angles interfere least.

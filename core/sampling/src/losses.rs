@@ -17,7 +17,7 @@ use headrace_geometry::math;
 ///
 /// The share [`MAY_FAIL`] of such stretches may fail because of lost returns.
 const STRETCH_M: f64 = 0.25;
-/// Share of stretches that may fail: 95 in 100 stretches pass.
+/// Share of stretches that may fail. The other 95 in 100 meet the target.
 const MAY_FAIL: f64 = 0.05;
 /// Maximum number of passes.
 ///
@@ -27,7 +27,8 @@ pub const MOST_PASSES: f64 = 10.0;
 const HARDLY: f64 = 1e-3;
 /// Share of a hole's diameter, along and around the tunnel, that lost passes and pings must cover.
 const INNER: f64 = 0.7;
-/// Upper limit of the share of lost returns: a head that receives one ping in a thousand receives nothing.
+/// Upper limit of the share of lost returns. In practice, a head that receives one ping in a thousand receives
+/// nothing.
 const MOST_SHARE: f64 = 0.999;
 
 /// Rate at which a head's pings lose their returns by chance.
@@ -81,14 +82,14 @@ impl LossRate {
 pub struct Sampled {
     /// Target T, m.
     pub target_m: f64,
-    /// Largest distance between neighbours of one turn, m.
+    /// Largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
     /// Perimeter of the wall, m.
     pub perimeter_m: f64,
 }
 
 impl Sampled {
-    /// Returns the number of passes over each place that replace a single pass because of lost returns.
+    /// Returns the number of passes over each place that lost returns require in place of a single pass.
     ///
     /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of two distances
     /// between passes: the one that the target allows, and the one that losses leave. It ranges from 1 without losses

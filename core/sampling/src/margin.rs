@@ -14,12 +14,12 @@ const NOTHING_M: f64 = 0.002;
 const LEFT_SHARE: f64 = 0.6;
 /// Maximum share of the target that the margin takes.
 const MOST_SHARE: f64 = 0.2;
-/// Share of the time between heads apart along the hull that counts towards the time between passes.
+/// Share of the time between heads that are apart along the hull. It counts towards the time between passes.
 ///
-/// Only some neighbouring passes are by heads apart, and holes between these passes grow by less than the heads'
+/// Only some neighbouring passes are by such heads, and holes between these passes grow by less than the heads'
 /// separation. With this share, a hole's size D is within two of its standard deviations 93 % of the time, over the
-/// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share of
-/// 0, and 99 % with a share of 1.
+/// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share
+/// of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
@@ -39,9 +39,9 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 /// Part of a target reserved for position errors, m.
 ///
 /// The margin is `confidence_sd` times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
-/// distance between neighbours of one turn. The margin is continuous in all inputs. It is at most a fifth of the
-/// target, and leaves at least three fifths of the distance between passes. With a larger margin, a slower speed
-/// would cost more than it gains.
+/// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth
+/// of the target, and leaves at least three fifths of the distance between passes. With a larger margin, a slower
+/// speed would cost more than it gains.
 pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t_y_m: f64) -> f64 {
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
     let least_m = math::sqrt(LEFT_SHARE * LEFT_SHARE * along_m2 + t_y_m * t_y_m);
@@ -56,14 +56,14 @@ pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t
 
 /// Exponent with which position errors grow with the time between two passes.
 ///
-/// It lies between the exponent of independent noise, 0.5, and that of drifting speeds, 1. VITA 2 with two heads,
-/// swaying, has 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
+/// It lies between the exponent of independent noise, 0.5, and that of drifting speeds, 1. On a swaying VITA 2 with
+/// two heads, the error is 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
 const GROWTH: f64 = 0.7;
 
-/// Target less the margin for position errors, as a function of speed.
+/// Target minus the margin for position errors, as a function of speed.
 ///
-/// The errors are known at the present speed only. At half that speed, the time between passes of heads apart along
-/// the hull is twice as long, and the margin is larger.
+/// The errors are known at the present speed only. At half that speed, the time between passes of heads that are
+/// apart along the hull is twice as long, and the margin is larger.
 #[derive(Debug, Clone, Copy)]
 pub struct RemainingTarget {
     /// Target T, m.
@@ -72,13 +72,13 @@ pub struct RemainingTarget {
     pub confidence_sd: f64,
     /// Standard deviation of a hole's size as measured, m.
     pub pass_error_m: f64,
-    /// [`error_time_s`] at the measurement of `pass_error_m`, seconds.
+    /// Value of [`error_time_s`] when `pass_error_m` was measured, seconds.
     pub measured_s: f64,
     /// Time between two passes of evenly spread heads, seconds.
     pub even_gap_s: f64,
     /// Length of hull between the heads, m.
     pub apart_m: f64,
-    /// The largest distance between neighbours of one turn, m.
+    /// The largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
 }
 
@@ -165,15 +165,15 @@ impl Margin {
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.
     pub geometry_mps: f64,
-    /// Speed with the wall that the vehicle hides, too.
+    /// Speed after hidden wall is also taken into account.
     pub hidden_mps: f64,
-    /// Speed with the phases and positions of the heads, too.
+    /// Speed after the phases and positions of the heads are also taken into account.
     pub phase_mps: f64,
-    /// Speed with the swing of beams, too.
+    /// Speed after the swing of beams is also taken into account.
     pub swing_mps: f64,
-    /// Speed with position errors, too.
+    /// Speed after position errors are also taken into account.
     pub position_mps: f64,
-    /// Speed with the passes for lost returns, too: the largest speed that meets the target.
+    /// Speed after lost returns are also taken into account: the largest speed that meets the target.
     pub losses_mps: f64,
     /// Standard deviation of a hole's size between two passes that `position_mps` assumes, m.
     pub pass_error_m: f64,

@@ -247,7 +247,7 @@ mod tests {
         fixtures::head(position, aft, 0.04)
     }
 
-    /// A point on a side is outside, like a point inside in only two of three coordinates.
+    /// A point on a side counts as outside, and so does a point that is inside in only two of three coordinates.
     ///
     /// Cylinders contain nothing.
     #[test]

@@ -198,7 +198,7 @@ impl Phasing {
         share
     }
 
-    /// Returns the heads with the phases of a schedule of `scheduled` heads for `planned_mps`.
+    /// Returns this phasing, but with the phases that a schedule of `scheduled` heads for `planned_mps` gives.
     ///
     /// A speed of zero means a schedule that ignores positions along the hull. Heads in sectors or out of step keep
     /// their phases.
@@ -433,7 +433,8 @@ impl Passes {
         even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
     }
 
-    /// Returns [`Passes::gap_s`] of all heads if they were evenly phased, seconds; zero without a head.
+    /// Returns the value that [`Passes::gap_s`] of all heads would have with even phases, seconds; zero without a
+    /// head.
     pub fn even_gap_s(&self) -> f64 {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {

@@ -24,10 +24,10 @@ pub use briefing::{Briefing, Heard, Hidden, HullAdvice, Start, ThinStrip};
 pub use mounts::InLine;
 pub use wall::{PatternSample, WallPlace};
 
-/// Share of the largest speed for which heads should be started.
+/// Heads should be started for this share of the largest speed.
 ///
-/// A pilot keeps a speed within 5 %, and heads apart along the hull are in phase only near the planned speed. See
-/// docs/why/field.md.
+/// A pilot keeps a speed within 5 %, and heads that are apart along the hull are in phase only near the planned
+/// speed. See docs/why/field.md.
 pub const HELD_SHARE: f64 = 0.95;
 /// Number of soundings per ring: soundings 0.1 degrees apart cover many start angles of each step.
 const RING: u32 = 3600;
@@ -79,12 +79,12 @@ struct Stance {
 pub struct PlannedMode {
     /// Mode of the first head; all heads have its name and step.
     pub mode: HeadMode,
-    /// Smallest, mean and largest straight-line distance between neighbours of one turn, m.
+    /// Smallest, mean and largest straight-line distance between neighbouring samples of one turn, m.
     ///
     /// The figures cover all heads, with the vehicle at its nominal pose and at rest. Source: the general case of Eq.
     /// 5, 6 and 10.
     pub chords_m: [f64; 3],
-    /// The largest distance between neighbours of one turn on the unrolled wall, at any tolerated pose, m.
+    /// The largest distance between neighbouring samples of one turn on the unrolled wall, at any tolerated pose, m.
     pub t_y2_m: f64,
     passes: Passes,
     ping_period_s: f64,
@@ -178,8 +178,8 @@ impl Planner {
             debug_assert!(false, "mode {mode}, which has a speed, is one of {}", self.modes.len());
             return Ok(known_mps);
         };
-        // At a lower speed, heads apart along the hull pass a place later after each other, so the margin is larger.
-        // The iteration starts from above, and each speed leads to a lower one until the speeds converge.
+        // At a lower speed, heads that are apart along the hull pass a place at longer intervals, so the margin is
+        // larger. The iteration starts from above, and each speed leads to a lower one until the speeds converge.
         let mut speed_mps = known_mps;
         for _ in 0..FALLS {
             let margin_m = self.margin_m(planned, target_m, speed_mps);

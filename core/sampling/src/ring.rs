@@ -116,7 +116,7 @@ impl Sounding {
 
     /// Distance to another sounding of the same head on the unrolled wall, m.
     ///
-    /// The distance is the shortest one around the perimeter. Holidays are measured by it.
+    /// The distance is the shortest one around the perimeter. The size of a holiday is measured in this way.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
@@ -135,7 +135,7 @@ pub struct Ring {
     /// Signed arc lengths from the first sounding to each sounding, m. The last entry is the arc length of the whole
     /// turn.
     ///
-    /// Values are negative if the head turns against arc length.
+    /// Values are negative if the head turns in the direction of falling arc length.
     way_m: Vec<f64>,
     perimeter_m: f64,
     /// Angles and beam directions of the soundings, cached between casts.
@@ -251,7 +251,7 @@ impl Ring {
         self.perimeter_m
     }
 
-    /// Signed arc length of a whole turn, m: negative if the head turns against arc length.
+    /// Signed arc length of a whole turn, m; negative if the head turns in the direction of falling arc length.
     pub fn way_round_m(&self) -> f64 {
         self.way_m.last().copied().unwrap_or(0.0)
     }

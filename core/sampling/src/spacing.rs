@@ -7,7 +7,7 @@ use headrace_geometry::math;
 /// T_max, m: the longer diagonal of the parallelogram of four neighbouring samples.
 ///
 /// `t_x_m` is the distance between passes, `advance_m` (d) the distance travelled between two pings, and `t_y_m` the
-/// largest distance between neighbours within a turn. All arguments are finite.
+/// largest distance between neighbouring samples of one turn. All arguments are finite.
 /// Source: Jorge et al. 2021, Eq. 16.
 pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     math::hypot(t_x_m + advance_m, t_y_m)
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn speed_for_a_target_gives_back_the_target() {
+    fn spacing_at_the_speed_for_a_target_equals_the_target() {
         let v = speed_for_target_mps(0.5, 0.12, 2.0, 0.02).unwrap();
         assert!((t_max_m(v * 2.0, v * 0.02, 0.12) - 0.5).abs() < 1e-12);
         assert_eq!(speed_for_target_mps(0.5, 0.5, 2.0, 0.02), None);

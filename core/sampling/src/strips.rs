@@ -93,7 +93,7 @@ pub struct Strips {
 stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, needed, strip_of; });
 
 impl Strips {
-    /// Creates an empty list with capacity for the strips of `arcs` arcs in `settings` settings.
+    /// Creates an empty list with capacity for the strips of `arcs` arcs and for `settings` settings of the heads.
     pub fn with_room(arcs: usize, settings: usize, soundings: u32) -> Self {
         let strips = 2 * arcs + 1;
         Self {
@@ -160,7 +160,7 @@ impl Strips {
         }
     }
 
-    /// Measures the largest steps on each strip in `settings` settings of the heads.
+    /// Measures the largest steps on each strip for each of `settings` settings of the heads.
     ///
     /// `stride` returns the ring stride of a head's step by setting and head; `None` for an absent head.
     ///
@@ -302,7 +302,7 @@ impl Strips {
         Some(slowest_mps)
     }
 
-    /// Returns T predicted on each strip at a speed, m.
+    /// Returns the spacing T predicted on each strip at a speed, m.
     fn ts_m(
         &self,
         setting: usize,
@@ -354,7 +354,8 @@ impl Strips {
         Ok(slowest)
     }
 
-    /// Returns two limits of T for each strip: within the strip, and between the samples beside it.
+    /// Returns two upper bounds of the spacing T for each strip: one from samples within the strip, and one from the
+    /// samples on either side of it.
     ///
     /// The first is `None` if no head sees the strip. The second is `None` if the strip is not thin.
     fn limits(

@@ -13,7 +13,7 @@ const BEATS: usize = 320;
 const WINDOW: DurNs = DurNs(30_000_000_000);
 /// Largest rotation between two passes that is attributed to navigation errors, radians.
 ///
-/// A rotation counts fully from twice this value.
+/// A rotation of twice this value or more counts fully.
 const DEAD_RAD: f64 = 0.0075;
 
 /// Swing of a vehicle.
@@ -23,7 +23,8 @@ pub struct Swing {
     pub rate_radps: f64,
     /// Largest rotation over any time within the history, radians.
     pub most_rad: f64,
-    /// Largest rotation between two heads apart along the hull, divided by the time between them, rad/s.
+    /// Largest rotation between the passes of two heads that are apart along the hull, divided by the time between
+    /// them, rad/s.
     ///
     /// The time ends when the rearmost head reaches the position of the foremost.
     pub apart_rate_radps: f64,
@@ -153,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_swing_counts_between_heads_apart_along_the_hull() {
+    fn slow_swing_counts_between_heads_at_different_positions_along_the_hull() {
         // The rotation between passes is within the navigation errors, but the rotation over ten seconds is not.
         let (looks, now) = looks(80.0, |t| [0.02 * math::sin(TAU * t / 50.0), 0.0]);
         let swing = looks.swing(now, 2.0, 10.0);
@@ -198,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn pitch_swing_counts_and_gaps_beyond_the_history_use_its_oldest_direction() {
+    fn pitch_swing_counts_and_gaps_longer_than_the_history_use_its_oldest_direction() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
         // The largest rotation is from the oldest stored direction to the one farthest from it.

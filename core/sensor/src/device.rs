@@ -287,7 +287,7 @@ pub trait Emulator<M>: Send + Sync {
     ///
     /// It is called once for each measurement begun, in the same order. An emulator with an emulated host also
     /// encodes imported measurements, which it did not begin. In imported measurements, a value that is not finite
-    /// was not measured, and no message carries it.
+    /// means that the quantity was not measured. No message carries such a value.
     fn tell(&mut self, measured: &M, line: LineSink<'_>);
 }
 

@@ -1,10 +1,10 @@
 //! Model of a device's clock against the host's: unwraps its ticks and estimates its drift.
 //!
 //! A device stamp arrives at the host after a minimum delay, and buses and queues only add to that delay. So the
-//! receive time less the device time has a lower envelope, and the slope of the envelope is the drift. Time is
-//! divided into stretches, and the least delayed stamp of each stretch is kept. A least-squares line is fitted to
-//! the kept stamps. A constant delay shifts all stamps equally, which changes the offset but not the slope. If all
-//! slots are full, stretches are merged in pairs, so that ten hours need no more memory than two minutes.
+//! receive time minus the device time has a lower envelope, and the slope of the envelope is the drift. Time is
+//! divided into stretches, and the least delayed stamp of each stretch is kept. A least-squares line is fitted to the
+//! kept stamps. A constant delay shifts all stamps equally, which changes the offset but not the slope. If all slots
+//! are full, stretches are merged in pairs, so that ten hours need no more memory than two minutes.
 
 use serde::{Deserialize, Serialize};
 

@@ -37,8 +37,8 @@ pub enum Carrier {
 pub struct DriverSetup {
     /// Start of the dive.
     ///
-    /// Each head runs its program from this time on. A head that joins later starts at the position that is due
-    /// then. So the heads keep their relative phase without communication between their drivers.
+    /// Each head runs its program from this time on. A head that joins later starts at the position that its program
+    /// gives for that time. So the heads keep their relative phase without communication between their drivers.
     pub begun: MonoNs,
     /// Program of a head; `None` for other devices.
     pub head: Option<HeadProgram>,

@@ -49,7 +49,7 @@ pub struct Inertia {
     pub attitude: Rot<Level, Sensor>,
     /// Turn rate, mean over the period, rad/s.
     pub rate_radps: Vec3<Sensor>,
-    /// Acceleration less gravity, mean over the period, m/s^2.
+    /// Acceleration minus gravity, mean over the period, m/s^2.
     pub force_mps2: Vec3<Sensor>,
 }
 

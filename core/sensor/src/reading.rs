@@ -12,7 +12,7 @@ pub enum Level {}
 /// Maximum number of sources in one loop.
 pub const MAX_SOURCES: usize = 64;
 
-/// Number of a registered source of bytes. Messages with equal times are ordered by it.
+/// Number of a registered source of bytes. Messages with equal times are ordered by this number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct SourceId(pub u16);
 
@@ -45,7 +45,7 @@ pub enum Reading {
     Attitude(Rot<Level, Sensor>),
     /// Turn rate, rad/s.
     AngularRate(Vec3<Sensor>),
-    /// Acceleration less gravity (specific force), m/s^2; +9.8 along z if the sensor is at rest and level.
+    /// Acceleration minus gravity (specific force), m/s^2; +9.8 along z if the sensor is at rest and level.
     SpecificForce(Vec3<Sensor>),
     /// Velocity over ground, m/s.
     VelocityOverGround(Vec3<Sensor>),
@@ -138,7 +138,7 @@ pub struct CountRestart {
 /// A reading and its time of validity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Decoded {
-    /// Time of validity: the receive time less the delays known to the decoder.
+    /// Time of validity: the receive time minus the delays known to the decoder.
     pub valid_at: MonoNs,
     /// The value.
     pub reading: Reading,

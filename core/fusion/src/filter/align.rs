@@ -21,13 +21,13 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
 
-/// Alignment time.
+/// Duration of the alignment.
 pub const LISTENS: DurNs = DurNs(1_000_000_000);
 /// Maximum number of echoes per echosounder, of which the median is used.
 const ECHOES: usize = 9;
 /// Initial standard deviations, in the order below.
 ///
-/// - Position in the section with echoes, and without.
+/// - Position in the cross-section with echoes, and without.
 /// - Chainage without a cable reading.
 /// - Yaw without a compass. The vehicle is then assumed to face along the tunnel.
 /// - Velocity.
@@ -134,7 +134,7 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // After a silence, the other sensors may also have returned only now. So the alignment starts here.
+            // After a silence, the other sensors may also have begun to send only now. So the alignment starts here.
             self.since = Some(at);
         }
     }
@@ -288,7 +288,8 @@ mod tests {
 
     /// Repeated readings of cable and compass add no information.
     ///
-    /// The chainage stays as uncertain as slack and scale, and the yaw stays as uncertain as the compass deviation.
+    /// The chainage stays as uncertain as slack and scale make it. The yaw stays as uncertain as the compass
+    /// deviation makes it.
     #[test]
     fn repeated_readings_after_alignment_add_no_information() {
         let context = Context {

@@ -55,7 +55,8 @@ impl BiasDrift {
     /// innovation, and its normalised square.
     pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
         for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
-            // The expected square is (P h / s)^2 s, summed over the axes.
+            // The expected square is (P h / s)^2 s, summed over the axes. P h is a covariance, and s is the
+            // innovation's variance.
             let expected = covariances.iter().map(|c| c * c).sum::<f64>() / variance;
             ratio.expected += expected;
             ratio.corrected += expected * nis;

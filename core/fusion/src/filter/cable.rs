@@ -1,8 +1,8 @@
 //! Decides whether cable counter and estimate agree.
 //!
-//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are
-//! kept. The counter's readings are withheld, and the inertial unit alone carries the chainage. The chainage is as
-//! uncertain as the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
+//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are kept.
+//! The counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the
+//! chainage equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
 //! estimate disagree".
 
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ const SAME_COUNT_M: f64 = 1e-6;
 /// Time after which a dispute is reported, and time for which readings must agree to end it.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// Maximum sd of the innovation at which an agreeing reading proves that nothing was lost, m.
+/// Maximum sd of the innovation at which an agreeing reading proves that the counter has lost no length, m.
 const SURE_M: f64 = 0.3;
 /// Maximum difference at which the counter has caught up with the vehicle, m: this share of the vehicle's distance
 /// since the dispute began, plus this length.
@@ -42,7 +42,7 @@ const MISSING_M: f64 = 0.02;
 /// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
 const SAME_M: f64 = 0.01;
-/// Additional share while the vehicle's own distance is uncertain.
+/// Additional share while the estimated distance of the vehicle is uncertain.
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
@@ -72,7 +72,7 @@ pub struct CableReading {
     pub at: MonoNs,
     /// Chainage shown by the counter, m.
     pub shown_m: f64,
-    /// Shown chainage less expected chainage, m.
+    /// Shown chainage minus expected chainage, m.
     pub off_m: f64,
     /// Standard deviation of `off_m`, m.
     pub sd_m: f64,
@@ -101,7 +101,7 @@ pub enum Use {
     ///
     /// The values are these corrections of chainage and speed, m and m/s.
     Dispute([f64; 2]),
-    /// The counter runs correctly again. The value is the difference that remains: shown less expected chainage, m.
+    /// The counter runs correctly again. The value is the difference that remains: shown minus expected chainage, m.
     Slipped(f64),
     /// Give up the estimate and restart from the running counter, which may be wrong by this length, m.
     Seek(f64),
@@ -112,7 +112,7 @@ pub enum Use {
 pub struct Cable {
     /// The last reading.
     last: Option<CableReading>,
-    /// The last reading that has another count than the previous reading.
+    /// The last reading whose count differs from the previous one.
     changed: Option<CableReading>,
     /// The first of the present series of readings beyond the gate.
     left: Option<CableReading>,
@@ -276,8 +276,8 @@ mod tests {
         CableReading { at, shown_m, off_m, sd_m, agrees, is_usual: true, is_lively: false }
     }
 
-    /// Returns when a dispute begins, s. The vehicle moves at 0.1 m/s; from 10 s on, the counter shows `share` of
-    /// the motion.
+    /// Returns the time at which a dispute begins, s. The vehicle moves at 0.1 m/s; from 10 s on, the counter shows
+    /// `share` of the motion.
     fn disputed_at(share: f64, change: impl Fn(f64, &mut CableReading)) -> Option<f64> {
         let mut cable = Cable::default();
         (0..200).map(|k| f64::from(k) / 10.0).find(|t| {
@@ -297,8 +297,9 @@ mod tests {
         assert_eq!(disputed_at(1.0, |_, _| {}), None);
     }
 
-    /// The running mean of white innovations has a standard deviation of 0.22. An innovation of constantly 1.5
-    /// brings the mean to five times this value after 1.4 s. An innovation of constantly 1 never does.
+    /// The running mean of white innovations has a standard deviation of 0.22. A constant innovation of 1.5 standard
+    /// deviations brings the mean to five times this value after 1.4 s. A constant innovation of 1 standard deviation
+    /// never does.
     #[test]
     fn cable_counter_is_disputed_after_biased_innovations() {
         let off = |sds: f64, sd_m: f64| {
@@ -319,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn cable_counter_is_disputed_after_unusual_motion_within_the_gate() {
+    fn unusual_readings_within_the_gate_start_a_dispute() {
         let at_s = disputed_at(1.0, |t, reading| reading.is_usual = t < 4.0).unwrap();
         assert!((at_s - 4.0).abs() < 1e-9, "{at_s}");
     }
@@ -338,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn dispute_while_the_count_is_constant_reverts_the_last_second() {
+    fn dispute_at_a_constant_count_reverts_the_last_second_of_corrections() {
         let mut cable = Cable::default();
         for k in 0..100_u32 {
             assert_eq!(cable.take(&reading(f64::from(k) / 10.0, 7.0, 0.0, 0.005)), Use::Fuse);
@@ -353,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn disputed_counter_difference_is_the_last_innovation_and_reported_after_1_s() {
+    fn dispute_is_reported_after_1_s_with_the_last_innovation() {
         let mut cable = Cable::default();
         assert_eq!(cable.take(&reading(0.0, 7.0, 0.01, 0.005)), Use::Fuse);
         assert_eq!(cable.differs_m().to_bits(), 0.0_f64.to_bits());
@@ -370,7 +371,7 @@ mod tests {
         assert!((doubt.from_m - 7.02).abs() < 1e-12 && (doubt.differs_m - 0.5).abs() < 1e-12, "{doubt:?}");
     }
 
-    /// Returns when the dispute of a counter that was wrong by -0.4 m ends, s, and how it ends.
+    /// Returns the time at which a dispute ends, s, and how it ends. At the start, the counter is wrong by -0.4 m.
     ///
     /// The vehicle moves at `speed_mps`, and the counter shows `share` of this motion. The innovation has the sd
     /// `sd_m`.
@@ -386,9 +387,9 @@ mod tests {
 
     /// The tolerance is a tenth of the distance plus a centimetre.
     ///
-    /// While the vehicle's own distance is uncertain, it is four tenths of the distance plus a centimetre.
+    /// While the estimated distance of the vehicle is uncertain, it is four tenths of the distance plus a centimetre.
     #[test]
-    fn dispute_ends_as_a_slip_once_counter_and_vehicle_speeds_match() {
+    fn counter_counts_as_slipped_once_its_speed_matches_the_vehicle_again() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [
             (1.0, 0.1, 0.0, 1.0, -0.4),
             (1.0, 0.2, 0.0, 1.0, -0.4),

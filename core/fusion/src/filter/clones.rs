@@ -19,11 +19,11 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Time between two clones.
 pub const STEP: DurNs = DurNs(2_000_000_000);
-/// Number of clones kept: over four turns of a head in its slowest mode (4 x 28 s).
+/// Number of clones kept. Together they cover over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
 /// Ratio of the new to the old variance of the chainage below which the chainage counts as suddenly more certain.
 ///
-/// This happens, for instance, when a silent cable returns.
+/// This happens, for instance, when the cable counter sends again after a silence.
 const SURE_SHARE: f64 = 0.1;
 /// Errors that move a sample along the tunnel: chainage, pitch and yaw.
 pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
@@ -218,11 +218,11 @@ mod tests {
 
     use super::*;
 
-    /// Soundings placed before a silent cable returns stay uncertain.
+    /// Soundings placed while the cable counter is silent stay uncertain.
     ///
-    /// They do not become gradually more certain over the last 2 s before the return.
+    /// They do not become gradually more certain over the last 2 s before the counter sends again.
     #[test]
-    fn soundings_before_a_silent_cable_returns_stay_uncertain() {
+    fn soundings_placed_while_the_cable_counter_is_silent_stay_uncertain() {
         let mut clones = ErrorClones::default();
         let mut factors = Factors::independent(core::array::from_fn(|_| 1.0));
         let at = |k: i64| MonoNs(0) + DurNs::from_millis(100 * k);
@@ -236,7 +236,7 @@ mod tests {
         let sd_m = |clones: &ErrorClones, lag_s: f64| {
             clones.relative(DurNs::from_secs_f64(lag_s)).unwrap().sd_m(Vec3::zero())
         };
-        // The last clone before the cable's return was 1.1 s old.
+        // The last clone was 1.1 s old when the counter sent again.
         for lag_s in [0.1, 0.5, 1.1, 2.0, 4.0] {
             let is_m = sd_m(&clones, lag_s);
             assert!((is_m - 1.0).abs() < 0.01, "{lag_s}: {is_m}");

@@ -13,8 +13,8 @@ use headrace_geometry::math;
 ///
 /// They are kept for a while because a counter fails some time before the failure is noticed.
 const RECENT_S: f64 = 1.0;
-/// Minimum time after which an unchanged count is a stop of the vehicle, s. Shorter pauses may come from slow motion
-/// and coarse steps.
+/// Minimum time after which an unchanged count means a stop of the vehicle, s. Shorter pauses may come from slow
+/// motion and coarse steps.
 const STANDS_S: f64 = 2.0;
 /// Standard deviation of the possible loss, as a share of the corrections.
 ///
@@ -109,8 +109,8 @@ impl CounterCorrections {
 
     /// Returns the corrections of the last second, m and m/s, and clears all corrections.
     ///
-    /// On a cable that is wound in by half metres, most corrections after a change of the count are right. When all
-    /// corrections were reverted, the chainage error grew to between 4 and 18 m, instead of 1 to 3 m (scene
+    /// On a cable that is wound in half a metre at a time, most corrections after a change of the count are right.
+    /// When all corrections were reverted, the chainage error grew to between 4 and 18 m, instead of 1 to 3 m (scene
     /// `leak-current`).
     pub fn take_back(&mut self) -> [f64; 2] {
         core::mem::take(self).recent
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn dispute_while_the_count_changes_reverts_the_last_second() {
+    fn dispute_at_a_changing_count_reverts_the_last_second_of_corrections() {
         let mut corrections = stood(0, -0.002, [0.0; 2]);
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn possible_loss_of_distance_is_0_3_of_corrections_beyond_chance() {
+    fn possible_loss_is_0_3_of_the_corrections_that_exceed_chance() {
         let sure = stood(50, 0.0, [0.0; 2]);
         assert!((sure.lost_m() - 0.3e-3 * (lately() + 49.0)).abs() < 1e-6, "{}", sure.lost_m());
         // The predicted standard deviation makes half of the corrections count as chance.
@@ -192,7 +192,7 @@ mod tests {
 
     /// After the first 20 s, corrections have the opposite sign, as for a hovering vehicle.
     #[test]
-    fn corrections_after_20_s_of_a_stop_add_no_possible_loss() {
+    fn corrections_later_than_20_s_into_a_stop_add_no_possible_loss() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
         let first_m = corrections.lost_m();
         assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of changes per block. The larger step of the last two blocks counts, because a garbled reading spoils
-/// only one.
+/// Number of changes per block. The larger step of the last two blocks counts, because a garbled reading spoils only
+/// one block.
 const BLOCK: u32 = 50;
 /// Assumed step of a counter that has not moved yet, m; common steps are 0.5 mm to 1 cm.
 const COMMON_STEP_M: f64 = 0.01;
@@ -111,7 +111,8 @@ mod tests {
 
     /// Returns the recognised step, m, of a wheel with step `step_m` after 3000 readings.
     ///
-    /// `way_m` is the cable's distance at a time in s. The wheel's counts are rounded to stated steps.
+    /// `way_m` returns the distance that the cable has moved at a time, s. The wheel's counts are rounded to stated
+    /// steps.
     fn recognised_m(step_m: f64, stated_m: f64, way_m: impl Fn(f64) -> f64) -> f64 {
         let mut step = CountStep::default();
         for k in 0..3000_u32 {
@@ -160,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_on_the_same_count_or_whole_steps_share_a_rounding_error() {
+    fn readings_at_equal_counts_or_whole_steps_apart_share_a_rounding_error() {
         let mut step = CountStep::default();
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
         for k in 0..=20_u32 {

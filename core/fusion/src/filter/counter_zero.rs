@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn counter_restart_keeps_the_zero_only_if_no_other_sensor_was_away() {
+    fn counter_restart_keeps_the_zero_only_if_the_other_sensors_kept_sending() {
         assert!(!is_lost(1000, 10, true, true));
         assert!(is_lost(1000, 10, false, true), "the counter was not away");
         assert!(is_lost(1000, 900, true, true), "all sensors were silent");

@@ -5,7 +5,8 @@
 //! wrong speed. The inertial unit is not compared here, because it only measures changes of speed; `slack_level.rs`
 //! compares it with the counter.
 //!
-//! A difference counts over a window W beyond this limit, with n the counter's variance and v the log's noise:
+//! Over a window W, a difference counts if it exceeds this limit, with n the variance of the counter and v the noise
+//! of the log:
 //!
 //! ```text
 //! 2 max(0.15 m, 3 slack_sd) + 5 sqrt(2 n + (scale distance)^2 + v^2 0.25 s W)
@@ -37,7 +38,7 @@ const NEAR: DurNs = DurNs(20_000_000);
 const SILENT: DurNs = DurNs(3_000_000_000);
 /// Delay of the comparison, because some readings arrive late.
 const BEHIND: DurNs = DurNs(500_000_000);
-/// Maximum difference in standard deviations, and the time for which a larger difference must last.
+/// Maximum difference in standard deviations, and the time for which a larger difference must last to count.
 const MOST_SDS: f64 = 5.0;
 const LASTS: DurNs = DurNs(1_000_000_000);
 /// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, plus the error of the mount.
@@ -67,7 +68,7 @@ pub(super) struct DistanceComparison {
     /// estimate.
     since: [Option<MonoNs>; 2],
     doubt: Option<CableDoubt>,
-    /// [`super::eskf::Eskf::ties`] of the estimate at the last comparison.
+    /// Value of [`super::eskf::Eskf::ties`] at the last comparison.
     ties: u32,
 }
 
@@ -322,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn sources_within_their_data_sheets_agree() {
+    fn sources_with_errors_within_their_data_sheets_agree() {
         for period_s in [3.0, 20.0, 60.0] {
             let cable_m = |t: f64| 1.002 * way_m(t) + 0.15 * math::sin(t * math::TAU / period_s);
             let none = compared(300, cable_m, |t| Some(1.01 * speed_mps(t) + 0.002), |t| Some(way_m(t)));
@@ -349,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn diverging_estimate_is_reported_unless_the_filter_reports_it() {
+    fn diverging_estimate_is_reported_unless_the_filter_itself_reports_a_dispute() {
         let runs = |t: f64| Some(way_m(t) + 0.5 * (t - 60.0).max(0.0));
         let (first_s, doubt) = compared(70, way_m, |_| None, runs);
         assert!((61.0..63.0).contains(&first_s.unwrap()), "{first_s:?}");

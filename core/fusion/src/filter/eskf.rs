@@ -1,6 +1,6 @@
 //! The error-state Kalman filter.
 //!
-//! An epoch is one leg of propagation followed by the measurements of its time.
+//! An epoch is one leg of propagation, followed by corrections with the measurements of that time.
 
 use core::ops::Range;
 
@@ -83,13 +83,13 @@ pub struct Eskf {
     pub clones: ErrorClones,
     /// Time of the last reacquisition of the chainage.
     pub way_sought: Option<MonoNs>,
-    /// Variance of the counter's possible loss during motion, m^2.
+    /// Variance of the length that the counter may have lost during motion, m^2.
     slipped_m2: f64,
-    /// Number of times at which the relation of later soundings to earlier ones was lost.
+    /// Number of times that the relative position of later and earlier soundings has become unknown.
     pub ties: u32,
     /// Start time of the estimate, and the standard deviation of yaw at the start or its last halving, radians.
     begun: (MonoNs, f64),
-    /// Number of times this standard deviation has halved while the estimate settled.
+    /// Number of times that the standard deviation of yaw has halved while the estimate settled.
     pub settled: u32,
     /// Estimates within the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
@@ -434,9 +434,9 @@ impl Eskf {
         }
     }
 
-    /// Returns the variance of a range from bumps of the wall, m^2, if many pings see the same bump.
+    /// Returns the variance, m^2, that bumps of the wall add to a range if many pings see the same bump.
     ///
-    /// 0 for other measurements.
+    /// It is 0 for other measurements.
     fn bumps(&self, kind: SensorKind, settings: &Settings) -> f64 {
         let sees_one = settings.learns && matches!(kind, SensorKind::Echosounder { .. });
         if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
@@ -444,7 +444,7 @@ impl Eskf {
 
     /// Returns the noise to use for one of many pings that see the same bump, m^2.
     ///
-    /// It also records the ping for the roughness.
+    /// It also records the ping, from which the roughness is learnt.
     fn spread_over_looks(
         &mut self,
         row: &ScalarUpdate,
@@ -507,8 +507,8 @@ impl Eskf {
         Some(row)
     }
 
-    /// Moves an estimate that lies beyond the wall back into the tunnel, because no beam can be predicted from
-    /// there.
+    /// Moves an estimate that lies beyond the wall back into the tunnel, because no beam can be predicted from beyond
+    /// the wall.
     fn stay_inside(&mut self, profile: &Profile) {
         let place = [self.state.position.y(), self.state.position.z()];
         if profile.contains(place) {

@@ -1,16 +1,16 @@
-//! Sums that show whether a setting is wrong: for one parameter, or for a source that may have another mount.
+//! Sums that show whether a setting is wrong: the value of a parameter, or the mount of a source.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Maximum number of range sources that are followed.
+/// Maximum number of range sources whose settings are checked.
 pub(super) const FOLLOWED: usize = 12;
 /// Out of this many readings, one is compared with its alternatives, because each comparison costs a ray.
 pub(super) const COMPARED: u32 = 4;
 /// Minimum number of blocks for computing the uncertainty of a figure.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
-/// Standard deviations from zero above which a figure counts as certain.
+/// Number of standard deviations from zero above which a figure counts as certain.
 ///
 /// The limit for an alternative is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
 pub(super) const SURE: f64 = 6.0;
@@ -124,9 +124,9 @@ impl Fit {
 
     /// Returns the estimate and its distance from zero in sd, if it certainly exceeds `least`.
     ///
-    /// The standard deviation is the larger one of the scatter of blocks and the noise of ranges, because blocks
-    /// alone may hardly scatter. `None` if the parameter hardly changes any range: an estimate from millimetres
-    /// only shows errors of the wall and beam models.
+    /// The standard deviation is computed from the scatter of blocks and from the noise of ranges, and the larger
+    /// result counts. Blocks alone may hardly scatter. `None` if the parameter hardly changes any range: changes of
+    /// millimetres only show errors of the wall and beam models.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
         let [estimate, scatter] = self.estimate()?;
         let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));
@@ -205,7 +205,8 @@ mod tests {
         fit
     }
 
-    /// The gain of an alternative varies between blocks. The alternative is as certain as its mean gain.
+    /// The gain of an alternative varies between blocks. The alternative is only as certain as the mean of these
+    /// gains.
     #[test]
     fn alternative_setting_is_less_certain_if_its_gain_scatters_between_blocks() {
         let sure_sd = |scatter_m2: f64| {
@@ -218,8 +219,8 @@ mod tests {
             }
             alternative.certain(alternative.share_left())
         };
-        // The mean gain is 0.2 m^2. Eight gains alternate around it by the scatter, so its sd is the scatter over
-        // the root of seven.
+        // The mean gain is 0.2 m^2. Eight gains lie alternately above and below it by the scatter, so its sd is the
+        // scatter over the root of seven.
         for scatter_m2 in [0.05, 0.04, 0.02] {
             let expected = 0.2 / scatter_m2 * math::sqrt(7.0);
             let found = sure_sd(scatter_m2).unwrap();

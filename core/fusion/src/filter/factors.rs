@@ -296,7 +296,8 @@ impl<const N: usize> Factors<N> {
 
     /// Whether no variance is negative.
     ///
-    /// True for any sequence of changes. Numbers that are no longer finite pass; [`Self::is_sound`] detects them.
+    /// This holds after any sequence of changes. Numbers that are no longer finite pass; [`Self::is_sound`] detects
+    /// them.
     pub fn has_variances(&self) -> bool {
         self.d.iter().all(is_variance)
     }
@@ -353,7 +354,7 @@ fn enter<const N: usize>(j: usize, column: &mut [f64; N], d: &mut f64, variance:
     *d = sum;
 }
 
-/// Whether a number may be a variance: it isn't negative, or it is no number.
+/// Whether a number may be a variance: true if it is not negative, or NaN.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "iterators pass references")]
 fn is_variance(number: &f64) -> bool {
     *number >= 0.0 || number.is_nan()

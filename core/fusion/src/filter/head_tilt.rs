@@ -135,7 +135,7 @@ impl TiltFit {
         let [pattern_2, both, _, pattern_off, _] = self.sums;
         let share = both / pattern_2;
         let steady = (pattern_off - tilt_rad * both) / pattern_2;
-        // Weights with which a block's sums add up to the remainder that the fit leaves.
+        // Weights that combine a block's sums into the remainder that the fit leaves in this block.
         let left = [share * steady, share * tilt_rad - steady, -tilt_rad, -share, 1.0];
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.blocks);

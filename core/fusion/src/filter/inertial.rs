@@ -39,7 +39,7 @@ pub struct Leg {
     /// Velocity and displacement caused by specific force, without gravity.
     velocity: Vector3<f64>,
     way: Vector3<f64>,
-    /// Effect of a gyro bias on velocity and displacement: the bias tilts the force.
+    /// Effect of a gyro bias on velocity and displacement. The bias tilts the force.
     tilting: Matrix3<f64>,
     tilting_twice: Matrix3<f64>,
     /// Time without gyro data, and without accelerometer data, s.

@@ -20,7 +20,7 @@ const SQUARE: f64 = 0.8;
 pub struct ScalarUpdate {
     /// Change of the expected value per unit of each error.
     pub h: Errors,
-    /// Measured value less expected value.
+    /// Measured value minus expected value.
     pub residual: f64,
     /// Variance of the measurement noise.
     pub noise: f64,
@@ -115,7 +115,7 @@ impl ScalarUpdate {
 const LEAST_COSINE: f64 = 0.5;
 /// Minimum distance that is assumed for the curvature of the wall, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// Standard deviations from zero above which an inclination counts as certain.
+/// Number of standard deviations from zero above which an inclination counts as certain.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.
@@ -175,8 +175,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     Some(row.with_one(RANGES, designed_m))
 }
 
-/// Predicts the height of a pressure sensor above the tunnel floor, m; `offset` is its position from the inertial
-/// unit.
+/// Predicts the height of a pressure sensor above the tunnel floor, m; `offset` is its position relative to the
+/// inertial unit.
 pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.z() + arm.z() + state.depth_offset_m;
@@ -186,7 +186,8 @@ pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> Sc
         .with_one(DEPTH, 1.0)
 }
 
-/// Predicts the chainage that the cable shows; `offset` is the position of the cable's end from the inertial unit.
+/// Predicts the chainage that the cable shows; `offset` is the position of the cable's end relative to the inertial
+/// unit.
 pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.x() + arm.x() + state.creep_m + state.slack_m;
@@ -197,8 +198,8 @@ pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -
         .with_one(SLACK, 1.0)
 }
 
-/// Predicts an attitude computed by a unit, about the tunnel's x, y and z. About z, it is a compass with a
-/// deviation.
+/// Predicts an attitude that an inertial unit computes, about the tunnel's x, y and z. About z, the unit is modelled
+/// as a compass with a deviation.
 ///
 /// The model compares rotations instead of angles, so it is smooth at any attitude, including a pitch of 90
 /// degrees.
@@ -219,7 +220,7 @@ pub fn attitude(
     ]
 }
 
-/// Predicts the velocity over ground in the frame of a sensor, m/s; `offset` is its position from the inertial
+/// Predicts the velocity over ground in the frame of a sensor, m/s; `offset` is its position relative to the inertial
 /// unit.
 ///
 /// `rate_radps` is the turn rate of the body.

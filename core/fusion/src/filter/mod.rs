@@ -104,7 +104,7 @@ pub struct FilterNavigation {
     /// Estimates after the last epoch, propagated by inertial samples.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// Covariance relative to an independent estimate with the same uncertainty.
+    /// Covariance relative to a much earlier visit, whose estimate is independent and has the same uncertainty.
     revisit: Relative,
     /// Number of restarts of the estimate. Reasons: it was lost or not finite, or the clock went back.
     restarts: u64,
@@ -142,7 +142,8 @@ impl FilterNavigation {
         self.is_running.then_some(&self.running)
     }
 
-    /// Returns when the cable readings left the expected range, once the doubt about them has lasted for a second.
+    /// Returns the time at which the cable readings left the expected range, once the doubt about them has lasted for
+    /// a second.
     ///
     /// `None` while the readings are trusted.
     pub fn cable_doubted_since(&self) -> Option<MonoNs> {

@@ -40,7 +40,7 @@ pub struct NoiseLevel {
     /// Running mean of the normalised squares of all innovations, and the number of these innovations.
     nis: f64,
     seen: u32,
-    /// Running mean of squared innovations less the estimate's own variance, as a share of the declared variance.
+    /// Running mean of squared innovations minus the estimate's own variance, as a share of the declared variance.
     share: f64,
     /// The same mean over the last few measurements, which shows changes of the wall.
     latest: f64,
@@ -56,7 +56,7 @@ impl Default for NoiseLevel {
 ///
 /// The declared tilt noise of an inertial unit covers its slow errors, which differences do not show. The declared
 /// range noise of a head also covers bumps and shape of the wall, which a leaning beam would confuse with yaw. So
-/// differences can only raise a head's level. The square of its total residual lowers it
+/// differences can only raise a head's level. Only the square of the total residual can lower it
 /// ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
@@ -91,7 +91,7 @@ impl NoiseLevel {
         nis / usual
     }
 
-    /// Processes a squared innovation less the estimate's own variance, as a share of the declared variance.
+    /// Processes a squared innovation minus the estimate's own variance, as a share of the declared variance.
     pub fn note_share(&mut self, share: f64, is_used: bool) {
         let most = if is_used { MOST } else { MOST_UNUSED };
         let share = share.clamp(-most, most);
@@ -177,7 +177,7 @@ mod tests {
     /// If the wall differs from its design, neighbouring ranges have about equal errors, so their differences show
     /// nothing.
     #[test]
-    fn wall_that_differs_in_shape_is_not_smooth() {
+    fn wall_that_differs_from_its_design_is_not_smooth() {
         near(level(2000, |_| 1.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |_| 3.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |k| math::sin(f64::from(k) / 40.0), true).smoothness().unwrap(), 0.5);

@@ -9,7 +9,7 @@ use crate::relative::Relative;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// Limits for georeferencing: standard deviations of the position in the section, m, and of yaw, radians.
+/// Limits for georeferencing: standard deviations of the position in the cross-section, m, and of yaw, radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
 /// Limit for the standard deviation of the chainage, both relative to the previous pass of the heads and absolute, m.
@@ -20,7 +20,7 @@ const ALONG_LIMIT_M: f64 = 1.0;
 pub struct PoseSd {
     /// Standard deviation of the chainage, without the part caused by the cable's scale, m.
     pub along_m: f64,
-    /// Standard deviation of the position in the section, in the less certain direction, m.
+    /// Standard deviation of the position in the cross-section, in the less certain direction, m.
     pub place_m: f64,
     /// Standard deviation of roll or pitch, whichever is larger, radians.
     pub tilt_rad: f64,

@@ -67,8 +67,8 @@ mod tests {
 
     /// Three readings with residuals of 1, 2 and 3 m are fitted by a parameter.
     ///
-    /// In the first case, the pose has no effect on the parameter's fit. In the second case, both have the same
-    /// effect.
+    /// In the first case, the pose has no effect on the parameter's fit. In the second case, pose and parameter
+    /// change the ranges in the same way.
     #[test]
     fn residuals_explained_by_a_pose_error_are_removed() {
         let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };

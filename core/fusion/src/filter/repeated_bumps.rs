@@ -12,7 +12,7 @@ use headrace_geometry::math;
 const MOST_BUMPS: f64 = 0.9;
 /// Limit for the number of passes.
 ///
-/// It is needed so that gyros alone do not let the estimate drift: returns from repeated bumps still hold it.
+/// Returns from repeated bumps must keep some weight, because on gyros alone the estimate would drift.
 const MOST_PASSES: f64 = 10.0;
 
 /// Counts how often the heads have passed the present bumps.
@@ -42,7 +42,7 @@ impl RepeatedBumps {
     /// Counts a return, and returns the variance with which to fuse it, m^2.
     ///
     /// `declared_m2` is the variance of a single return, and `bumps` is the share of this variance that comes from
-    /// bumps. All returns from one bump together have the weight of their mean. Each return adds the part of that
+    /// bumps. Together, all returns from one bump weigh as much as their mean. Each return adds the part of that
     /// weight that is new.
     pub(super) fn noise_m2(
         &mut self,
@@ -77,9 +77,9 @@ mod tests {
         seen.noise_m2(settings.bump_m / settings.return_step_rad / around, DECLARED_M2, bumps, &settings)
     }
 
-    /// In a least-squares sum, all returns from one bump have the weight of their mean.
+    /// In a least-squares sum, all returns from one bump together weigh as much as their mean.
     #[test]
-    fn returns_from_one_bump_have_the_weight_of_their_mean() {
+    fn returns_from_one_bump_together_weigh_as_much_as_their_mean() {
         let bumps = 0.6;
         for around in [1.0, 4.0] {
             let mut information = 0.0;

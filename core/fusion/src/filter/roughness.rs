@@ -60,8 +60,8 @@ impl Default for Roughness {
 impl Roughness {
     /// Processes a ping that has corrected the estimate.
     ///
-    /// `bump` is the share of a bump that the ping adds. `scale_m2` is the variance of a sum of two ranges that the
-    /// unknown scale of ranges causes.
+    /// `bump` is the share of a bump for which the ping counts. `scale_m2` is the variance that the unknown scale of
+    /// ranges causes in a sum of two ranges.
     pub(super) fn note(&mut self, look: Look, bump: f64, scale_m2: f64, settings: &Settings) {
         let faces = |other: &&Look| {
             other.by_place.dot(&look.by_place) < FACING

@@ -113,7 +113,7 @@ pub struct Settings {
     /// Whether noise levels of the sources are learnt. Without learning, likelihoods of different settings can be
     /// compared.
     pub learns: bool,
-    /// Share of a wall range's correction of attitude and related errors that is applied.
+    /// Share of the computed correction of attitude and related errors that a wall range applies.
     ///
     /// With 0, ranges do not correct the attitude; 1 is the optimal estimate. Coverage depends on the attitude of one
     /// pass relative to the next. Gyros measure this relative attitude more accurately than ranges do, because walls

@@ -7,7 +7,8 @@
 //! that the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it
 //! uses only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
 //!
-//! With u the counter less the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant T:
+//! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant
+//! T:
 //!
 //! ```text
 //! d(L) = u(t) - 3 u(t - L) + 3 u(t - 2 L) - u(t - 3 L)
@@ -37,11 +38,11 @@ const KNOTS: usize = 256;
 const MEMORY_S: f64 = 40.0;
 /// Limit at which a third difference is clipped, as a multiple of the rms. Faults are rare and large; slack is not.
 const MOST_SDS: f64 = 3.0;
-/// Margin of the noise when a mean square is compared with it, in standard deviations of the mean square.
+/// Margin added to the noise before it is subtracted from a mean square, in standard deviations of the mean square.
 ///
 /// A margin is needed because the mean comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
-/// Time constant with which the inertial velocity decays, s. The decay limits the numbers and hardly changes a
+/// Time constant with which the inertial velocity decays, s. The decay keeps the values bounded and hardly changes a
 /// third difference.
 const FORGETS_S: f64 = 1000.0;
 /// Time constant for levelling the attitude and aligning it with the estimate's heading, s.
@@ -52,17 +53,17 @@ const LEVELS_S: f64 = 100.0;
 const MOST_OFF_RAD: f64 = 0.3;
 /// Maximum size of a third difference at which counter and inertial motion agree, in multiples of the usual size.
 ///
-/// Agreement is judged from `FEW` differences on. From `ENOUGH` differences on, their usual size counts as known.
+/// Agreement is judged once there are `FEW` differences. Once there are `ENOUGH`, their usual size counts as known.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
 /// Until the first comparison, slack is assumed to be faster than declared by this factor.
 const AT_FIRST: f64 = 2.0;
-/// Third differences up to `AGREES_SDS` times this are usual, m. A lever arm or a tilting vehicle causes them.
+/// Third differences up to `AGREES_SDS` times this are always usual, m. A lever arm or a tilting vehicle causes them.
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// Size of third differences over a second above which slack constantly moves the counter, in counter steps.
+/// Size of third differences at a lag of 1 s, in counter steps, above which slack moves the counter constantly.
 const LIVELY_STEPS: f64 = 4.0;
 /// Time between two comparisons of the averages with the model.
 const COMPARES: DurNs = DurNs(1_000_000_000);
@@ -77,7 +78,7 @@ pub(super) const MOST_REACH_M: f64 = 0.15;
 #[derive(Debug, Clone)]
 pub(super) struct SlackEstimate {
     attitude: Option<Rot<Tunnel, Body>>,
-    /// Inertial position and velocity along the tunnel, up to a constant each.
+    /// Inertial position and velocity along the tunnel, each up to an unknown constant.
     way_m: f64,
     speed_mps: f64,
     /// Inertial positions within the last epoch.
@@ -122,7 +123,7 @@ impl SlackEstimate {
 
     /// Whether slack constantly moves a counter that has this step, m.
     ///
-    /// On average, third differences over a second then exceed [`LIVELY_STEPS`] steps and the noise.
+    /// On average, third differences at a lag of 1 s then exceed [`LIVELY_STEPS`] steps and the noise.
     pub(super) fn is_lively(&self, step_m: f64, noises: Noises, settings: &Settings) -> bool {
         let least_m = LIVELY_STEPS * step_m;
         self.squares_m2[1] > (least_m * least_m).max(noises.third_square_m2(1.0, settings))
@@ -209,7 +210,7 @@ impl SlackEstimate {
         self.differences.clear();
     }
 
-    /// Returns the third difference of counter less inertial position, m.
+    /// Returns the third difference of counter minus inertial position, m.
     ///
     /// The second value is the spread of the counter's distances in the three lags, m.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
@@ -399,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn motion_of_a_stuck_counter_counts_as_unusual_within_1_s() {
+    fn readings_of_a_stuck_counter_count_as_unusual_within_1_s() {
         let sticks = |t: f64| {
             if (60.0..70.0).contains(&t) {
                 -0.2 * (t - 60.0)

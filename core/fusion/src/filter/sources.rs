@@ -14,12 +14,12 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 /// Limits for a stuck head.
 ///
 /// At least this many returns have the same range although the expected range varies by more than `VARIES_M`. The
-/// expected ranges must be certain to `SURE_M`, standard deviation. A low limit is safe, because a return that is
+/// standard deviation of the expected ranges must be at most `SURE_M`. A low limit is safe, because a return that is
 /// dropped by mistake costs nothing.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Minimum time between used attitudes, because their errors are correlated over a longer time.
+/// Minimum time between used attitudes. Their errors stay correlated for longer than this.
 ///
 /// The same applies to cable readings and depths.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
@@ -52,9 +52,9 @@ pub struct Consistency {
     pub nis_sum: f64,
     /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement.
     ///
-    /// Each innovation adds two terms. The first is the NIS (clipped at the gate) less 1. The second is the
-    /// logarithm of the innovation's variance divided by the usual variance. If a log is interpreted in two ways,
-    /// the interpretation with the lower value is more likely.
+    /// Each innovation adds two terms. The first is the NIS (clipped at the gate) minus 1. The second is the
+    /// logarithm of the innovation's variance divided by the usual variance. If a log is interpreted in two ways, the
+    /// interpretation with the lower value is more likely.
     pub surprise: f64,
 }
 
@@ -119,7 +119,7 @@ impl Source {
 
     /// Processes a head's range; returns whether the head reports the same range in every direction.
     ///
-    /// Inputs: the range less the expected range, m, and the standard deviation of the expected range, m. While the
+    /// Inputs: the range minus the expected range, m, and the standard deviation of the expected range, m. While the
     /// estimate is uncertain, returns `false`.
     pub fn says_one_range(&mut self, reading: &Reading, residual_m: f64, estimate_sd_m: f64) -> bool {
         let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = reading else { return false };
@@ -142,8 +142,8 @@ impl Source {
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since the last reading that was put into the window. If so, this reading is the
-    /// new last.
+    /// Whether `period` has passed since the last reading that was put into the window. If so, this reading becomes
+    /// the last one.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {

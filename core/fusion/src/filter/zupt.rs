@@ -22,8 +22,8 @@ const ASKS_FOR: DurNs = DurNs(60_000_000_000);
 /// Number of remembered pauses of the cable, and the multiple of the longest pause after which the cable is at
 /// rest.
 ///
-/// They are needed if a winch operator winds by half metres. The cable is then stationary between pulls while the
-/// vehicle moves on.
+/// They are needed if a winch operator winds in half a metre at a time. The cable is then stationary between pulls
+/// while the vehicle moves on.
 const PAUSES: usize = 4;
 const PAUSES_TO_REST: u64 = 2;
 /// Largest difference between means at rest: of the turn rate, rad/s, and of the specific force, m/s^2.
@@ -210,8 +210,8 @@ mod tests {
         );
     }
 
-    /// If the cable is wound in by half metres, its pauses are longer than the averaging windows for rest, and the
-    /// vehicle moves during the pauses.
+    /// If the cable is wound in half a metre at a time, its pauses are longer than the averaging windows for rest,
+    /// and the vehicle moves during the pauses.
     ///
     /// The vehicle is at rest once the cable has been stationary for twice the time between the last pulls.
     #[test]

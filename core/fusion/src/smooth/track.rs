@@ -110,7 +110,7 @@ impl Track {
         self.points.is_empty()
     }
 
-    /// Returns the fix at time `at`, read from the clock after it has been set back `clock` times.
+    /// Returns the fix at time `at` of the clock that has been set back `clock` times.
     ///
     /// Errors: the part of the fix that is too uncertain or missing at that time.
     pub fn fix(&self, clock: u32, at: MonoNs) -> Result<Fix, NoFix> {

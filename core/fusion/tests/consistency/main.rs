@@ -1,4 +1,4 @@
-//! The filter's errors against its standard deviations, in seeded dives that vary everything that varies in the
+//! Compares the filter's errors with its standard deviations, in seeded dives that vary everything that varies in the
 //! field.
 //!
 //!     cargo test --release -p headrace_fusion --test consistency two_thousand -- --ignored --nocapture
@@ -22,7 +22,7 @@ use world::{Fault, Log, Motion, Recipe};
 
 /// Seeds of the test that always runs; the full set has ten times as many.
 const FEW: Range<u64> = 0..200;
-/// Seeds of dives with a velocity log, whose behaviour is one of four in turn.
+/// Seeds of dives with a velocity log, which is sound or has one of three faults, in turn.
 const WITH_LOG: Range<u64> = 0..80;
 /// Seeds of dives with a hovering vehicle.
 const HOVERING: Range<u64> = 0..24;

@@ -1,6 +1,6 @@
 //! Dives drawn from seeds: a true motion, and readings of sensors with known errors.
 //!
-//! It shares no code with the simulator, and only the wall, the site and the units with the filter.
+//! It shares no code with the simulator. With the filter, it shares only the wall, the site and the units.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};

@@ -11,12 +11,12 @@ const MODE_NAME_BYTES: usize = 15;
 /// The limiting factor of the advice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
-    /// The distance between passes is the limit: a lower speed helps.
+    /// The distance between passes is the limit, so a lower speed helps.
     HelixPitch,
     /// A lower speed does not help, but another mode or position, or a steadier vehicle would.
     ///
-    /// The cause is the distance between neighbours of one turn, the width of a strip that no head sees, or the swing
-    /// of the beams.
+    /// The cause is the distance between neighbouring samples of one turn, the width of a strip that no head sees, or
+    /// the swing of the beams.
     AngularStep,
     /// No advice is possible without position and heading.
     NoHeadingOrFix,
@@ -167,7 +167,7 @@ pub struct Advice {
     pub v_max_mps: f64,
     /// Lower end of the advised interval of speeds, m/s; zero if all lower speeds meet the target.
     ///
-    /// At lower speeds, heads apart along the hull run out of phase.
+    /// At lower speeds, heads that are apart along the hull run out of phase.
     pub from_mps: f64,
     /// Speed nearest to the present one that meets the target, m/s.
     ///
@@ -177,25 +177,25 @@ pub struct Advice {
     pub reason: Reason,
     /// T_max predicted at the present speed, m; `None` if it cannot be predicted or is unbounded.
     pub predicted_t_m: Option<f64>,
-    /// Whether T of the present turn is forecast to exceed the target; false without a prediction.
+    /// Whether the spacing T of the present turn is forecast to exceed the target; false without a prediction.
     pub will_exceed: bool,
-    /// Whether T of the present turn may exceed the target; false without a prediction.
+    /// Whether the spacing T of the present turn may exceed the target; false without a prediction.
     ///
-    /// The predicted T then exceeds the target less the margin for position errors.
+    /// The predicted T then exceeds the target minus the margin for position errors.
     pub may_exceed: bool,
-    /// Target less the margin for position errors, m.
+    /// Target minus the margin for position errors, m.
     pub sure_m: f64,
     /// The longest time between two passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
     /// The longest time between two passes if the heads' passes were evenly spread, seconds.
     pub even_pass_gap_s: f64,
-    /// The largest distance between neighbours of one turn, m.
+    /// The largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
     /// Time between two pings, seconds; the longest of any head.
     pub ping_period_s: f64,
     /// Phase error of the head farthest out of phase, radians of its turn.
     ///
-    /// `None` in sectors, or with one head.
+    /// `None` for heads in sectors, or for a single head.
     pub phase_error_rad: Option<f64>,
     /// Remaining tunnel and time.
     pub left: Left,
@@ -218,8 +218,8 @@ pub struct Advice {
 impl Advice {
     /// Whether the figures agree with each other.
     ///
-    /// Speeds and times are finite and not negative. There is a speed exactly if a lower speed helps, and the advised
-    /// interval ends at this speed.
+    /// Speeds and times are finite and not negative. The advice states a speed if and only if a lower speed helps,
+    /// and the advised interval ends at this speed.
     pub fn is_consistent(&self) -> bool {
         let figures = [self.v_max_mps, self.sure_m, self.pass_gap_s, self.even_pass_gap_s, self.t_y_m];
         let is_figure = |figure: f64| figure >= 0.0 && figure.is_finite();

@@ -5,7 +5,7 @@ use super::search::SPEED_MARGIN;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Less restrictive advice is displayed once no more restrictive advice has occurred for this time.
+/// Length of the past period whose most restrictive advice is displayed.
 const HOLD: DurNs = DurNs(1_000_000_000);
 /// Time for which a higher speed must last before it is displayed.
 ///
@@ -18,13 +18,13 @@ const RISES_BY: f64 = 0.03;
 const FALLS_BY: f64 = SPEED_MARGIN / 2.0;
 /// Number of stored advice updates: all updates within `HOLD` at 5 Hz.
 const HELD: usize = 6;
-/// Share by which the predicted T must exceed the target before the display forecasts an exceedance.
+/// Share by which the predicted spacing T must exceed the target before the display forecasts an exceedance.
 ///
 /// The share is half of the speed margin, so that the forecast does not flicker at the advised speed.
 const BEYOND: f64 = SPEED_MARGIN / 2.0;
-/// Share by which the predicted T must exceed the remaining target before a possible exceedance is displayed.
+/// Share by which the predicted spacing T must exceed the remaining target before a possible exceedance is displayed.
 ///
-/// The remaining target is the target less the margin for position errors. A pilot may exceed the advised speed by 1
+/// The remaining target is the target minus the margin for position errors. A pilot may exceed the advised speed by 1
 /// or 2 %.
 const MAYBE_BEYOND: f64 = 0.03;
 
@@ -130,7 +130,7 @@ impl Hysteresis {
     }
 }
 
-/// Whether the predicted T exceeds a limit.
+/// Whether the predicted spacing T exceeds a limit.
 ///
 /// Without a prediction, the result is the forecast of the advice itself.
 fn exceeds(advice: &Advice, limit_m: f64) -> bool {
@@ -241,7 +241,7 @@ mod tests {
     fn exceedance_is_displayed_at_once_and_cleared_below_the_target() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
-            // T exceeds the target by less than `BEYOND`.
+            // The spacing T exceeds the target by less than `BEYOND`.
             vec![at(0.502); 3],
             vec![at(0.503)],
             vec![at(0.5005); 10],

@@ -1,6 +1,6 @@
 //! Intervals of speed that meet a target.
 //!
-//! Heads apart along the hull are in phase only at some speeds, so several intervals may meet a target.
+//! Heads that are apart along the hull are in phase only at some speeds, so several intervals may meet a target.
 //!
 //! The advised speed depends on the measured heads and the vehicle's pose, not on the present speed. It is the upper
 //! end of the highest interval. If that interval vanishes while heads run out of phase, the next interval may be far
@@ -34,7 +34,8 @@ pub(super) struct Driving<'a> {
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: RemainingTarget,
-    /// Remaining target at unlimited speed, and the heads' distance along the hull, m.
+    /// Target that remains after the position margin at unlimited speed, and the distance between the heads along the
+    /// hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
     /// Speed above which no phase meets the target, m/s.
@@ -73,7 +74,7 @@ impl Driving<'_> {
     ///
     /// At the given speed v, passes are g = `gap_s` apart in time. At a lower speed u, heads at most a apart along
     /// the hull shift by up to a (1 / u - 1 / v) in time relative to each other. The longest gap is then at least g
-    /// less that shift, so its length is at least u g - a (1 - u / v).
+    /// minus that shift, so its length is at least u g - a (1 - u / v).
     fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
         /// Allowance for rounding.
         const A_LITTLE: f64 = 1e-9;
@@ -114,8 +115,8 @@ impl Driving<'_> {
 
     /// Returns the speed reduced by the margin [`SPEED_MARGIN`], or by up to twice that margin.
     ///
-    /// The larger margin applies where T grows faster than the speed, because the heads run out of phase. A speed
-    /// error of 1 % then costs more than 1 % of T.
+    /// The larger margin applies where the spacing T grows faster than the speed, because the heads run out of phase.
+    /// A speed error of 1 % then costs more than 1 % of T.
     pub(super) fn kept_back_mps(&self, fastest_mps: f64) -> f64 {
         const STEEP: f64 = 2.0 * SPEED_MARGIN;
         let meets = |speed_mps: f64| self.meets(speed_mps, 0.0);
@@ -129,7 +130,8 @@ impl Driving<'_> {
         less_mps.min(search::kept_back_mps(fastest_mps, 1.0 - edge_mps / fastest_mps / (1.0 + STEEP), meets))
     }
 
-    /// Returns the best speed near the previous result; `None` if T there exceeds the target by over [`EASE`].
+    /// Returns the best speed near the previous result; `None` if the spacing T there exceeds the target by over
+    /// [`EASE`].
     fn kept_mps(&self, last_mps: f64) -> Option<f64> {
         let near = (-TRIED..=TRIED).map(|k| last_mps * (1.0 + TRIED_SHARE * f64::from(k)));
         let best =

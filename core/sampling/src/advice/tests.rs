@@ -31,7 +31,7 @@ struct Case {
 }
 
 impl Case {
-    /// Heads at the positions `x_m` along the hull with these angles, all in FAST, in the centre of `ceran`.
+    /// Heads at the positions `x_m` along the hull with these angles, all in FAST mode, in the centre of `ceran`.
     fn new(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, target_m: f64) -> Self {
         let profile = shapes::ceran().unwrap();
         let specs: Vec<HeadSpec> = x_m.iter().map(|x| spec([*x, 0.0, 0.0], 0.0)).collect();
@@ -78,7 +78,7 @@ impl Case {
         self.advisor().advise(&self.situation, Swing::default(), self.left_s)
     }
 
-    /// T at a speed, m, by Eq. 16 of Jorge et al. 2021, with the phases of the heads at that speed.
+    /// Spacing T at a speed, m, by Eq. 16 of Jorge et al. 2021, with the phases of the heads at that speed.
     fn t_at_m(&self, advice: &Advice, speed_mps: f64) -> f64 {
         let passes = Phasing::of(&self.situation).at(speed_mps);
         let gap_s = passes.gap_s(passes.heads()).unwrap();
@@ -129,7 +129,7 @@ fn advised_speed_is_not_below_a_present_speed_that_meets_the_target() {
 }
 
 #[test]
-fn missing_head_leaves_its_sector_unseen() {
+fn wall_in_the_sector_of_a_missing_head_is_unseen() {
     let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
     case.situation.layout = HeadLayout::SectorOffset;
     let whole = case.advice();
@@ -362,7 +362,7 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
 }
 
 #[test]
-fn swing_widens_gaps_between_heads_apart_along_the_hull() {
+fn swing_widens_gaps_between_heads_at_different_positions_along_the_hull() {
     let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
     let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
@@ -442,7 +442,7 @@ fn target_is_met_in_the_speed_interval_and_missed_below_it() {
     assert!(t_at(0.985 * from) > 1.0, "{}", t_at(0.985 * from));
 }
 
-/// None of the speeds that a failed test rules out meets the target.
+/// No speed that a failed test rules out meets the target.
 ///
 /// The heads are anywhere along the hull and side by side, with hidden wall, swing and position errors.
 #[test]
@@ -554,7 +554,7 @@ fn nearest_and_highest_speed_intervals_are_advised() {
         };
         outside += 1;
         assert!(t_m(speed_mps) > 0.5 && t_m(nearest_mps) <= 0.5, "{speed_mps}: {nearest_mps}");
-        // All speeds that are closer, by more than the step of 1 %, miss the target, except in the narrowest
+        // Any speed that is closer by more than the search step of 1 % misses the target, except in the narrowest
         // intervals.
         let off = math::ln(nearest_mps / speed_mps).abs() - 0.01;
         for nearer in (1..200).map(|k| 0.003 * f64::from(k)).filter(|nearer| *nearer < off) {
@@ -574,7 +574,7 @@ fn nearest_and_highest_speed_intervals_are_advised() {
 ///
 /// A vehicle 2 % above the advised speed then exceeds the target by at most 2 %.
 #[test]
-fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
+fn speed_margin_is_larger_where_the_spacing_grows_faster_than_speed() {
     let (mut even, mut steep) = (0, 0);
     for (apart_m, k) in
         [0.0, 0.3, 1.1, 2.5].into_iter().flat_map(|apart_m| (0..40).map(move |k| (apart_m, k)))

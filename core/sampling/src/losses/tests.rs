@@ -78,7 +78,7 @@ fn along_m(t_y_m: f64, passes: f64) -> f64 {
 }
 
 #[test]
-fn required_passes_let_19_of_20_stretches_pass() {
+fn required_passes_leave_no_hole_in_19_of_20_stretches() {
     let rates = [
         LossRate::independent(0.02),
         LossRate::independent(0.1),
@@ -98,7 +98,7 @@ fn required_passes_let_19_of_20_stretches_pass() {
 }
 
 #[test]
-fn too_few_passes_let_fewer_than_9_in_10_stretches_pass() {
+fn too_few_passes_leave_holes_in_over_1_in_10_stretches() {
     let rates =
         [LossRate::independent(0.2), LossRate::independent(0.5), LossRate { share: 0.2, after_lost: 0.8 }];
     for t_y_m in [0.07, 0.1] {
@@ -111,7 +111,7 @@ fn too_few_passes_let_fewer_than_9_in_10_stretches_pass() {
 }
 
 #[test]
-fn passes_of_a_silent_head_are_replaced_by_other_heads() {
+fn other_heads_make_up_for_the_passes_of_a_silent_head() {
     let sound = LossRate::default();
     let deaf = LossRate::independent(1.0);
     assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
@@ -144,7 +144,7 @@ fn required_passes_grow_continuously_with_losses() {
 }
 
 #[test]
-fn no_extra_passes_without_losses_or_without_a_speed() {
+fn no_extra_passes_are_needed_without_losses_or_a_possible_speed() {
     assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
     // If steps are longer than the target, no speed meets the target.

@@ -1,4 +1,4 @@
-//! Questions to a plan, and the answer for each mode.
+//! Planning questions, and the answer for each mode.
 
 use serde::Serialize;
 
@@ -10,8 +10,8 @@ use crate::spacing::Spiral;
 
 /// A planning question.
 ///
-/// A target asks for the speed. A speed or a time asks for the target that can be met. A target with a speed or time
-/// asks whether both are compatible.
+/// With a target, it asks for the speed. With a speed or a time, it asks for the target that can be met. With a
+/// target and a speed or time, it asks whether both are compatible.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
     /// Target T, m.
@@ -27,7 +27,7 @@ pub struct Question {
 pub struct Answer {
     /// The mode.
     pub mode: &'static str,
-    /// theta, degrees.
+    /// theta: angle between two pings, degrees.
     pub step_deg: f64,
     /// n: pings per turn. Eq. 3.
     pub steps_per_turn: u32,
@@ -45,7 +45,7 @@ pub struct Answer {
     pub t_y_max_rest_m: f64,
     /// T_yp: upper bound of the mean, m. Eq. 10.
     pub t_yp_m: f64,
-    /// T_y2: the largest distance between neighbours of one turn on the wall, at any tolerated pose, m.
+    /// T_y2: the largest distance between neighbouring samples of one turn on the wall, at any tolerated pose, m.
     pub t_y2_m: f64,
     /// The largest speed that meets the target, m/s.
     pub v_max_mps: Option<f64>,

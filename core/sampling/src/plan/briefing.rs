@@ -23,7 +23,7 @@ pub struct Briefing {
     pub strips: Vec<ThinStrip>,
     /// Start of each head.
     pub starts: Vec<Start>,
-    /// Spacing rule for heads apart along the hull that start at equal angles.
+    /// Spacing rule for heads that are apart along the hull and start at equal angles.
     pub hull_rules: Vec<HullAdvice>,
     /// Pairs of heads that can receive each other's pings.
     pub exposures: Vec<Heard>,
@@ -92,7 +92,7 @@ pub struct HullAdvice {
 pub struct Heard {
     /// The two heads.
     pub heads: [usize; 2],
-    /// Time for which the beams point at each other's heads, seconds per turn or sweep.
+    /// Time for which each beam points at the other head, seconds per turn or sweep.
     pub facing_s: f64,
     /// Time for which the beams hit the same patch of wall, seconds per turn or sweep.
     pub same_patch_s: f64,

@@ -83,7 +83,7 @@ fn t_max_at_the_largest_speed_equals_the_target() {
 ///
 /// The planner takes the worst start angle of the pings, so its T_max is at most slightly larger.
 #[test]
-fn ideal_heads_give_the_reference_table() {
+fn ideal_heads_have_the_t_max_of_the_reference_table() {
     let expected = [
         [4.259, 2.132, 1.069],
         [2.134, 1.074, 0.548],
@@ -167,7 +167,7 @@ fn plan_gives_the_speed_for_a_target_or_the_target_for_a_time() {
 }
 
 #[test]
-fn impossible_plan_names_the_cause() {
+fn error_about_an_impossible_plan_names_the_cause() {
     let why = |inspection| Planner::new(inspection).unwrap_err();
     assert_eq!(why(ideal(0)), SamplingError::HeadCount { heads: 0 });
     let one = Inspection { layout: HeadLayout::SectorOffset, ..ideal(1) };
@@ -302,7 +302,7 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
     assert_eq!(Planner::new(ideal(1)).unwrap().in_line(0.5).unwrap(), None);
 }
 
-/// Heads apart along the hull are in phase only near the speed for which they were started.
+/// Heads that are apart along the hull are in phase only near the speed for which they were started.
 ///
 /// The live advice therefore differs from a plan, which may restart the heads.
 #[test]
@@ -327,7 +327,7 @@ fn heads_started_for_another_speed_lower_the_largest_speed() {
     );
 }
 
-/// The error names the configured target, not the target less position errors.
+/// The error names the configured target, not the target minus the margin for position errors.
 #[test]
 fn error_names_the_configured_target() {
     let swinging = Inspection { yaw_rate_radps: 10.0, ..vita_2(HeadLayout::PhaseShift) };

@@ -14,11 +14,11 @@ use headrace_geometry::time::DurNs;
 pub struct WallPlace {
     /// Arc length of the place, m.
     pub arc_m: f64,
-    /// Largest distance between neighbours of one turn on the wall, m, over the heads that see the place.
+    /// Largest distance between neighbouring samples of one turn on the wall, m, over the heads that see the place.
     pub t_y_m: f64,
     /// Smaller and larger distance between passes, m; `None` if no head sees the place.
     ///
-    /// The distances differ where two distances alternate.
+    /// They differ where two distances alternate.
     pub t_x_m: Option<[f64; 2]>,
     /// T at the place, m, from `t_y_m` and the larger `t_x_m`; `None` if no head sees the place.
     pub t_m: Option<f64>,
@@ -135,7 +135,7 @@ impl Around {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
-    /// Records a head's steps at each place that they cross and the head sees.
+    /// Records a head's steps at each place that the steps cross and that the head sees.
     fn add(
         &mut self,
         planner: &Planner,

@@ -20,7 +20,7 @@ pub struct Going {
     pub swing_most_m: Option<f64>,
 }
 
-/// Inputs of T on a strip: the time between passes, and the distance between neighbours around the wall.
+/// Inputs of the spacing T on a strip: the time between passes, and the distance between neighbours around the wall.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limit {
     pub(super) gap_s: f64,
@@ -48,8 +48,8 @@ impl Limit {
 
     /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).
     ///
-    /// t is the sum of gap and ping period, w the swing speed, u the swing speed between heads apart, and a their
-    /// distance.
+    /// t is the sum of gap and ping period, w the swing speed, u the swing speed between heads that are apart along
+    /// the hull, and a their distance.
     ///
     /// Two other limits may allow a higher speed, which is then the result: the largest displacement by swing between
     /// passes, and the circle between two rows of turning points.

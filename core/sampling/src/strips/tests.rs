@@ -161,7 +161,7 @@ fn hidden_arc_outside_a_sector_has_no_effect() {
 ///
 /// The rectangle's corners lie within the heads' sectors.
 #[test]
-fn long_step_in_a_sector_counts_with_the_local_time_between_passes() {
+fn long_step_in_a_sector_uses_the_pass_interval_at_that_place() {
     let (target_m, sweep_s, count) = (0.5, 8.0, 75);
     let profile = shapes::rectangle(6.0, 4.0).unwrap();
     let ring = ring(&profile);

@@ -5,7 +5,7 @@ use crate::passes::Passes;
 
 /// Number of head sets whose gaps are stored.
 ///
-/// Strips hidden from one or two heads rarely have more different head sets.
+/// If strips are hidden from one or two heads, there are rarely more different head sets.
 const SETS: usize = 8;
 /// Number of strips whose head set is cached; the gaps of other strips are computed again.
 const STRIPS: usize = 64;

@@ -96,7 +96,7 @@ fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
 /// checksum.
 const MOST_MATCHED: usize = 100;
 
-/// Returns corrupted frames that pass by chance.
+/// Returns corrupted frames that pass as good frames by chance.
 ///
 /// One byte of a good frame is changed, and its checksum, if any, is changed to match.
 pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {

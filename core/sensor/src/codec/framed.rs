@@ -46,9 +46,9 @@ pub trait Framing: Copy {
 /// Codec of a [`Framing`]: keeps an incomplete frame between pushes and finds frames in arbitrary input.
 ///
 /// `N` is the maximum frame length; a candidate that needs more bytes is bad. On a byte stream, scanning resumes at
-/// the second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame
-/// is skipped, and does not count as a bad frame. In a whole message, the first bytes that are no frame make the
-/// rest of the message one bad frame. Apparent frames in that rest are ignored.
+/// the second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame is
+/// skipped, and does not count as a bad frame. In a whole message, all bytes from the first one outside a frame to
+/// the end count as one bad frame. Apparent frames among these bytes are ignored.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]

@@ -11,9 +11,9 @@ const MAX_PARTS: usize = 32;
 
 /// Stamps each frame of a byte stream with the receive time of the packet that contained its first byte.
 ///
-/// A frame may begin in an earlier packet than the one that completes it, at any time before. If the held bytes
-/// come from more than `MAX_PARTS` packets, the latest ones before the newest are merged into one. A frame that
-/// begins in a merged packet, after a false start, is then stamped too early.
+/// A frame may begin in a packet that arrived long before the one that completes it. If the held bytes come from more
+/// than `MAX_PARTS` packets, the packets just before the newest one are merged into one. A frame that begins in a
+/// merged packet, after a false start, is then stamped too early.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]

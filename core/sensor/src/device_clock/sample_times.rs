@@ -1,9 +1,9 @@
 //! Corrected times of samples that arrive late, from the device's own clock.
 //!
-//! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms
-//! then have the same receive time. The first of them would count for the whole gap before the burst, even if it
-//! measured a short jerk. The device's stamps separate the samples. Receive time less device time is usually near
-//! its minimum, and any excess is the delay of the sample. Receive times still define the order; only the time of
+//! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms then
+//! have the same receive time. The first of them would count for the whole gap before the burst, even if it measured
+//! a short jerk. The device's stamps separate the samples. Receive time minus device time is usually near its
+//! minimum, and any excess is the delay of the sample. Receive times still define the order; only the time of
 //! validity is corrected.
 
 use core::cmp::Ordering;
@@ -17,8 +17,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Rate at which the usual delay rises while stamps are later than usual, per second. Clocks drift apart more
 /// slowly.
 ///
-/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` as fast. It therefore converges to a delay
-/// that one stamp in ten is below. A garbled stamp has no larger effect than any other.
+/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` times as fast. It therefore converges to a
+/// delay that is longer than the delays of one stamp in ten. A garbled stamp has no larger effect than any other
+/// stamp.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
 /// Maximum time between stamps that counts in a change of the usual delay, s.
@@ -37,7 +38,7 @@ pub struct SampleTimes {
     delay: UsualDelay,
     stamped: Option<Stamped>,
     last_reading: Option<MonoNs>,
-    /// Number of samples whose stamp came first, less number of samples whose stamp came last; clamped.
+    /// Number of samples whose stamp came first, minus the number of samples whose stamp came last; clamped.
     ///
     /// The count is needed because some units send the stamp after the readings.
     leads: i8,

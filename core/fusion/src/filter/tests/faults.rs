@@ -241,7 +241,7 @@ fn jumping_sensor_is_rejected() {
 }
 
 #[test]
-fn restarted_counter_keeps_the_chainage_only_if_no_other_sensor_was_away() {
+fn counter_restart_keeps_the_chainage_only_if_the_other_sensors_kept_sending() {
     for (away_s, are_all_away, is_lost) in [(0.0, false, true), (1.0, true, true), (1.0, false, false)] {
         let rig = Rig::new(cruise, 1);
         let mut events = rig.events(0.0, 60.0);

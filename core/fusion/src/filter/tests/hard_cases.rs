@@ -391,8 +391,8 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// The advice to stand still ends once the bias is known, within the time stated at first. The advice does not
-/// return.
+/// The advice to stand still ends once the bias is known, within the time that it stated at first. The advice does
+/// not return.
 #[test]
 fn stand_still_advice_ends_once_the_bias_is_known() {
     let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };
@@ -413,7 +413,7 @@ fn stand_still_advice_ends_once_the_bias_is_known() {
     assert!(asked[begun + 31..].iter().all(|asked_s| *asked_s == 0), "{asked:?}");
 }
 
-/// Returns the largest relative increase of the sd between passes after the tenth minute, once per round.
+/// Returns the largest relative increase of the sd between passes after the tenth minute, sampled once per round.
 fn change_over_hours(hours: u32) -> f64 {
     let rig = Rig { imu_s: 0.1, ..Rig::new(rounds, 1) };
     let mut nav = rig.navigation();

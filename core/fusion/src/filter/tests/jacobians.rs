@@ -19,8 +19,9 @@ const STATES: u64 = 300;
 const GRAVITY_MPS2: f64 = 9.81;
 /// Step of the central differences.
 ///
-/// The truncation error is about the square of the step: 1e-8 for numbers near one. The rounding error is about
-/// 1e-16 / 1e-4 times the numbers. They reach some hundreds of metres, so it is 1e-10.
+/// The truncation error is about the square of the step: 1e-8 for numbers near one. The rounding error is about 1e-12
+/// times the numbers, which is the rounding of a double divided by the step. The numbers reach some hundreds of
+/// metres, so the rounding error is 1e-10.
 const STEP: f64 = 1e-4;
 /// Tolerance that covers both errors with a margin. A wrong sign or a missing term causes an error of at least
 /// 0.01.
@@ -100,7 +101,7 @@ fn moved(state: &State, error: usize, by: f64) -> State {
 
 /// Checks a row against central differences of its residual.
 ///
-/// The expected value is the measured value less the residual.
+/// The expected value is the measured value minus the residual.
 fn check_row(
     what: &str,
     state: &State,
@@ -327,10 +328,10 @@ fn go_on(start: &State, felt: &[InertialSample]) -> (State, Transition) {
 
 /// The transition uses the rotation in the middle of a sample for the whole sample.
 ///
-/// Only the bias terms are wrong by this, by up to a quarter of the angle turned in a sample (0.01 rad). The
-/// largest bias terms are 0.1 s of turning and 0.05 s^2 of force, so the error is up to 0.1 x 0.0025. In most
-/// blocks, a wrong factor or a missing term causes a larger error. The exception is the displacement by a gyro bias
-/// through tilting, 10 m/s^2 x 0.1^3 / 6. So each block is compared with its own size.
+/// This affects only the bias terms, by up to a quarter of the angle turned in a sample (0.01 rad). The largest bias
+/// terms are 0.1 s of turning and 0.05 s^2 of force, so the error is up to 0.1 x 0.0025. In most blocks, a wrong
+/// factor or a missing term causes a larger error. The exception is the displacement by a gyro bias through tilting,
+/// 10 m/s^2 x 0.1^3 / 6. So each block is compared with its own size.
 #[test]
 fn transition_matrix_equals_finite_differences_of_the_model() {
     let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];

@@ -9,7 +9,7 @@ impl Profile {
     ///
     /// Arc length begins at the lowest crossing of y = 0. `reference` defaults to the polygon's centroid.
     ///
-    /// Errors: see [`ProfileError`]; its vertices are indices into `points`.
+    /// Errors: see [`ProfileError`], which gives a vertex as an index into `points`.
     /// Allocates: startup only.
     pub fn polygon(points: &[Yz], reference: Option<Yz>) -> Result<Self, ProfileError> {
         if let Some(vertex) = points.iter().position(|p| !p.iter().all(|c| c.abs() <= 1000.0)) {

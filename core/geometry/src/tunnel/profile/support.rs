@@ -1,4 +1,4 @@
-//! Extent of a profile with many elements in any direction, bounded by a table.
+//! Table that bounds the extent of a profile with many elements in any direction.
 
 use super::plane::{Yz, dot, norm};
 use crate::math::{self, TAU};
@@ -9,7 +9,8 @@ const DIRECTIONS: usize = 128;
 /// Extent of the points in each direction of the table, m.
 ///
 /// Between two directions of the table, their two entries give an upper bound. The bound is too large by at most half
-/// the longest edge of the points' hull times tan(pi / [`DIRECTIONS`]), 0.025: 12 mm for each metre of a flat wall.
+/// the longest edge of the points' hull times tan(pi / [`DIRECTIONS`]) = 0.025. This is 12 mm for each metre of a
+/// flat wall.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Support(Vec<(Yz, f64)>);
 

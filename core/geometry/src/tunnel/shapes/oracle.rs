@@ -49,7 +49,7 @@ fn rays_nearly_along_the_wall_agree_with_50_digit_values() {
 }
 
 #[test]
-fn rays_through_and_an_ulp_beside_corners_agree_with_50_digit_values() {
+fn rays_through_corners_and_an_ulp_beside_them_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("corner");
     assert_eq!(count, 36);
     found("geometry.corner", range_m.max(arc_m), 1e-14);
@@ -108,8 +108,8 @@ fn rays_along_walls_end_at_the_end_of_the_wall() {
             let hit = profile
                 .cast_from_inside(origin, direction)
                 .unwrap_or_else(|| panic!("no wall at turn {turn}"));
-            // Because of rounding, the ray may meet the wall along which it runs. Beyond the wall's end there is only
-            // the arc.
+            // Through rounding, a ray along a straight wall may hit this wall before its end. Past the end, only the
+            // arc can be hit.
             let off = [hit.point[0] - end[0], hit.point[1] - end[1]];
             let beyond_m = off[0] * direction[0] + off[1] * direction[1];
             let across_m = off[0] * direction[1] - off[1] * direction[0];

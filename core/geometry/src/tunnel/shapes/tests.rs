@@ -194,7 +194,7 @@ fn repeated_collinear_and_almost_equal_points_have_no_effect() {
 proptest! {
     /// Seen from the reference point, the wall point at any arc length has that same arc length.
     #[test]
-    fn point_at_and_arc_of_are_inverse(which in 0usize..7, share in 0.0f64..1.0) {
+    fn point_at_and_arc_of_are_inverse_functions(which in 0usize..7, share in 0.0f64..1.0) {
         let (name, profile) = all().swap_remove(which);
         let arc = share * profile.perimeter_m();
         let back = profile.arc_of(profile.point_at(arc));

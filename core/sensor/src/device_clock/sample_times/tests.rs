@@ -79,7 +79,7 @@ fn garbled_stamp_affects_only_its_own_sample() {
 }
 
 #[test]
-fn stopped_device_clock_corrects_few_sample_times_and_restarted_clock_none() {
+fn few_sample_times_are_corrected_after_a_clock_stop_and_none_after_a_restart() {
     let none = vec![0; 4000];
     let stuck = times(&none, |k| in_step(k.min(1000)));
     let put_back = stuck.iter().filter(|(made, at)| made != at).count();
@@ -105,7 +105,7 @@ fn stamped(times: &mut SampleTimes, count: u64, is_first: bool) -> Vec<MonoNs> {
 }
 
 #[test]
-fn stamp_belongs_to_the_first_reading_of_each_kind() {
+fn stamp_belongs_to_the_first_reading_of_each_kind_after_it() {
     let mut times = SampleTimes::new(32, TICK);
     stamped(&mut times, 20, true);
     let at = |ms: u64| MonoNs(1_000_000_000 + ms * 1_000_000);
