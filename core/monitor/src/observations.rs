@@ -64,7 +64,7 @@ pub struct Occurrences {
     /// Number of occurrences.
     ///
     /// An occurrence is a sample outside the tunnel, a judgement of a contradicting section, the beginning of
-    /// distrust in a head or the cable counter, or another doubtful setting.
+    /// distrust in a head or the cable counter, or a change of the doubtful setting.
     pub count: u64,
     /// Chainage of the first occurrence, m.
     pub first_m: f64,
@@ -126,7 +126,7 @@ impl Observations {
     /// Records a lasting occurrence that began at `since`. Later calls for the same occurrence don't count
     /// again.
     ///
-    /// Returns true when the first occurrence is first recorded.
+    /// Returns true only when the first occurrence is recorded.
     pub(crate) fn note_lasting(
         &mut self,
         source: Option<SourceId>,

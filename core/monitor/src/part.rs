@@ -77,7 +77,7 @@ impl<S: Stage> Part<S> {
         });
     }
 
-    /// Makes a component of the entities state.
+    /// Registers a component of the entities as state, which snapshots contain.
     pub(super) fn add_component_state<T: Component<Mutability = Mutable> + Stateful>(
         &mut self,
         name: &'static str,
@@ -139,7 +139,7 @@ impl<S: Stage> Part<S> {
     /// Runs the systems of a stage.
     pub(super) fn run(&mut self, stage: S) {
         let Self { world, stages, .. } = self;
-        // An empty schedule takes time, too.
+        // Empty schedules are skipped, because running them takes time, too.
         if let Some(systems) = stages.iter_mut().find(|other| other.stage == stage && !other.is_empty) {
             systems.schedule.run(world);
         }
@@ -167,9 +167,10 @@ impl<S: Stage> Part<S> {
 
 #[cfg(test)]
 impl<S: Stage> Part<S> {
-    /// Panics unless resources and components of the entities are either state or among the given types.
+    /// Panics unless each resource and each component of the entities is either state or among the given
+    /// types.
     ///
-    /// The given types must be constant since arming, or set in each tick.
+    /// The given types must be constant after arming, or set anew in each tick.
     pub(super) fn has_state_but_for(&self, others: &[TypeId]) {
         let mut bare = World::new();
         schedule().run(&mut bare);
@@ -189,7 +190,7 @@ impl<S: Stage> Part<S> {
     }
 }
 
-/// Empty schedule: single-threaded, with an ambiguous order of systems as an error.
+/// Empty, single-threaded schedule that reports an ambiguous order of systems as an error.
 fn schedule() -> Schedule {
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());

@@ -156,8 +156,8 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadDescriptions
 /// Text of the actions for a missed stretch, as in [`action_text`]. If there are several actions, the first
 /// two are named.
 ///
-/// An action that is needed before the vehicle goes back comes first. The action "slower" is given by the
-/// speed.
+/// An action that is needed before the vehicle goes back comes first. The action "slower" is expressed by the
+/// stated speed.
 pub fn actions_text(
     actions: &[Action],
     back_to_m: f64,

@@ -15,7 +15,7 @@ use headrace_sampling::advice::Reason;
 pub const STARTING: &str = "STARTING";
 /// Action for finding the gyros' bias. The number of seconds follows.
 pub const STAND_STILL: &str = "stand still";
-/// State of a section that not all heads have passed.
+/// State of a section where some heads have not been.
 pub const NOT_INSPECTED: &str = "not inspected";
 /// State of wall without any data.
 pub const UNSEEN: &str = "unseen";

@@ -14,12 +14,12 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Time after the first update from which data or positions that never arrived count as missing.
+/// Grace period after the first update. Data or positions that haven't arrived by its end count as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
 /// Time for which `CannotSay` stays active after its stretch has last grown.
 const GROWS: DurNs = DurNs(10_000_000_000);
-/// Remaining cable, time and charge, percent, at or below which a warning, an alarm and an emergency alarm
-/// are raised.
+/// Thresholds for the remaining cable, time and charge, percent, at which a warning, an alarm and an
+/// emergency alarm are raised.
 ///
 /// A negative share means that the limit is exceeded.
 const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
@@ -48,7 +48,7 @@ pub(crate) struct Beat<'a> {
     pub(crate) setting: Option<SettingDoubt>,
 }
 
-/// A condition that may hold.
+/// A condition that was checked, and whether it holds.
 pub(super) struct Seen {
     pub(super) kind: ListKind,
     pub(super) source: Option<SourceId>,
@@ -360,7 +360,7 @@ impl AlertList {
 }
 
 impl Figures {
-    /// Figures of a continuing situation: the present figures, but the highest speed so far.
+    /// Figures of a continuing situation: the present ones, except that the speed is the highest so far.
     ///
     /// Once the pilot has slowed down, the present speed would no longer show by how much the limit was
     /// exceeded.

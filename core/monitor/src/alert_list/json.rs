@@ -289,7 +289,7 @@ impl AlertList {
         counts
     }
 
-    /// Remaining cable, time and charge, as of a live state.
+    /// Remaining cable, time and charge at the time of a live state.
     pub fn left(&self, state: &LiveState) -> LeftJson {
         LeftJson {
             cable_m: self.cable_left_m(state.chainage_m),

@@ -103,9 +103,9 @@ pub struct MarginsJson {
 pub struct TurnJson {
     /// Target T, m.
     pub target_m: f64,
-    /// Forecast T, m; `None` if it is unbounded.
+    /// Forecast spacing T, m; `None` if it is unbounded.
     pub predicted_t_m: Option<f64>,
-    /// Whether the forecast T will exceed the target.
+    /// Whether the forecast spacing T will exceed the target.
     pub will_exceed: bool,
     /// Largest step along the wall, m.
     pub t_y_m: f64,

@@ -21,8 +21,8 @@ pub struct RunReport {
     /// Figures for the causes that the text names. Each comes from a section with that cause.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
-    /// Source ids of the silent heads. They are those of the section with the largest hole, or of the section
-    /// that represents silence as a cause.
+    /// Source ids of the heads that were silent in the section with the largest hole, or in the section that
+    /// represents silence as a cause.
     pub silent_sources: Vec<String>,
     /// Beginning, m.
     pub start_m: f64,

@@ -49,7 +49,7 @@ pub struct SectionReport {
     pub verdict: &'static str,
     /// Whether the section is open although further driving won't change it.
     ///
-    /// The vehicle began or turned back there, so not all heads have passed the section.
+    /// The vehicle began or turned back there, so some heads have not been in the section.
     pub not_inspected: bool,
     /// Reason for `cannot_say`; `None` with other verdicts.
     pub cannot_say: Option<&'static str>,
@@ -61,7 +61,7 @@ pub struct SectionReport {
     pub cleared_s: Option<f64>,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful_returns: u32,
-    /// Whether the section has samples of a head that was distrusted soon afterwards. Such a section can't
+    /// Whether the section has samples of a head that became distrusted soon afterwards. Such a section can't
     /// pass.
     pub suspect: bool,
 }

@@ -1,10 +1,10 @@
-//! Heads, as the systems of a walk see them.
+//! Query for the heads, which the systems of a walk share.
 
 use bevy_ecs::prelude::Query;
 
 use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
 
-/// A head: number, mount, hidden angles, sweep and reach.
+/// A head: number, mount, hidden angles, sweep and the chainages that it has reached.
 pub(super) type Heads<'w, 's> = Query<'w, 's, HeadParts>;
 type HeadParts = (
     &'static Head,

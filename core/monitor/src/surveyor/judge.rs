@@ -93,8 +93,8 @@ fn digest(judgements: &mut ResultStream, request: &Request, change: u64, section
 
 /// Records changed runs for the list of alerts.
 ///
-/// Cleared runs come last. The alert of a cleared run passes to the runs that remain of it, so the list must
-/// have these runs first.
+/// Cleared runs come last. The runs that remain of a cleared run take over its alert, so the list must have
+/// these runs first.
 fn note_runs(notices: &[Notice], stop: (usize, bool), sections: &Sections, runs: &mut Vec<RunInput>) {
     for cleared in [false, true] {
         for notice in notices {
@@ -130,9 +130,9 @@ mod tests {
 
     const AT: MonoNs = MonoNs(7_000_000_000);
 
-    /// Judges a section without samples, at 20 m of distance from places where samples may still land.
+    /// Judges a section without samples, 20 m from the places where samples may still land.
     ///
-    /// Some heads haven't passed `not_passed_m`, m.
+    /// Up to chainage `not_passed_m`, m, some heads have not been in the tunnel.
     fn judged(coverage: &mut Coverage, section: i64, not_passed_m: f64) -> (Vec<Notice>, Vec<RunInput>) {
         let request = Request {
             section,
@@ -175,8 +175,7 @@ mod tests {
         }
     }
 
-    /// The alert of a cleared run passes to the runs that remain of it, so the list must have these runs
-    /// first.
+    /// The runs that remain of a cleared run take over its alert, so the list must have these runs first.
     #[test]
     fn cleared_runs_come_last_and_runs_without_room_are_dropped() {
         let mut coverage = coverage();

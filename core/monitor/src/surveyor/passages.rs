@@ -6,8 +6,8 @@ use crate::resources::Coverage;
 use headrace_coverage::{Drive, HeadReach, Loss, PassError, Visit};
 use headrace_geometry::tunnel::Profile;
 
-/// A ping is no evidence of the speed if this many standard deviations of its error relative to the previous
-/// pass reach the target.
+/// Limit for using a ping's speed as evidence. The ping isn't used if this many standard deviations of its
+/// position error relative to the previous pass reach the target.
 const ADRIFT_SD: f64 = 2.0;
 
 /// Adds a ping to the passage of the section that the ping's head is in.

@@ -1,4 +1,4 @@
-//! Returns classified as wall become samples, doubtful ones are counted and recorded.
+//! Turns returns classified as wall into samples. Counts and records doubtful returns.
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 use bevy_ecs::system::SystemState;
@@ -77,7 +77,7 @@ type End<'w, 's> = (
     Outputs<'w>,
 );
 
-/// Applies the returns that still wait at the end of a dive, when no more returns will come, as doubtful.
+/// At the end of a dive, applies the returns that still wait as doubtful, because no more returns will come.
 /// Allocates: outside a tick only.
 pub(super) fn end_returns(world: &mut World) {
     let mut state = SystemState::<End<'_, '_>>::new(world);
@@ -97,7 +97,7 @@ pub(super) fn end_returns(world: &mut World) {
     }
 }
 
-/// Applies a waiting return that has been classified, and then the pings since.
+/// Applies a waiting return that has been classified, and then the effects of the pings that followed it.
 fn settle(
     context: &mut WallContext<'_>,
     sweep: &mut HeadSweep,
