@@ -220,7 +220,8 @@ pub(super) struct LastSample {
     pub(super) unbroken: bool,
 }
 
-/// Chainages that a head has reached; `None` before its first ping with a fix.
+/// Reach of a head: where its samples land now, and have landed so far; `None` before its first ping with a
+/// fix.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct HeadFrontier(pub Option<HeadReach>);
 

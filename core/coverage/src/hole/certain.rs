@@ -4,7 +4,7 @@ use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 
-/// Search resolution, m: a circle with a margin below this to the required radius may be missed.
+/// Search resolution, m. A circle that exceeds the required radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
 
 /// Required radius of a circle, as a function of the arc length of its centre.

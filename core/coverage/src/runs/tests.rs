@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs, with the section states against which they are checked.
+/// Runs, together with the section states that they must match.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,

@@ -25,7 +25,7 @@ fn stretch_contains_all_existing_sections_that_it_touches() {
 ///
 /// A section that is not judged counts as open.
 #[test]
-fn each_section_counts_in_metres_once_by_its_latest_verdict() {
+fn each_section_counts_once_in_the_metres_of_its_latest_verdict() {
     let mut sections = sections();
     let [pass, fail] = [Verdict::Pass, Verdict::Fail].map(|verdict| Some(verdict as usize));
     for (before, now) in [(None, fail), (None, fail), (None, fail), (None, pass), (fail, pass), (fail, None)]

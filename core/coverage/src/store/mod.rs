@@ -28,7 +28,7 @@ const BRICK_M: f64 = 1.0;
 const MOST_ROWS: usize = 32;
 /// Maximum number of samples in all open bricks.
 const OPEN_SAMPLES: usize = 1 << 18;
-/// Overhead words per brick: unused words in the last block, and head switches.
+/// Overhead words per brick: unused words in the last block, and words that switch heads.
 const WORDS_PER_BRICK: usize = 48;
 
 /// A sample on the unrolled wall.
@@ -323,7 +323,7 @@ impl SampleStore {
     }
 
     fn bricks_between(&self, from_m: f64, to_m: f64) -> core::ops::RangeInclusive<u32> {
-        // Packing may have moved a sample near the edge of a brick beyond this edge.
+        // Packing may have moved a sample near the edge of a brick across this edge.
         self.brick_of(self.row_near(from_m - packed::MOVED_M))
             ..=self.brick_of(self.row_near(to_m + packed::MOVED_M))
     }

@@ -4,7 +4,7 @@ use bevy_ecs::prelude::Query;
 
 use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
 
-/// A head: number, mount, hidden angles, sweep and the chainages that it has reached.
+/// A head: number, mount, hidden angles, sweep and reach.
 pub(super) type Heads<'w, 's> = Query<'w, 's, HeadParts>;
 type HeadParts = (
     &'static Head,

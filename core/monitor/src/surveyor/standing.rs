@@ -22,7 +22,7 @@ const ASTERN_MPS: f64 = -0.02;
 /// Time for which an observation holds after its latest occurrence, if occurrences have no duration.
 const HOLDS: DurNs = DurNs(10_000_000_000);
 
-/// A head: number, source and the chainages that it has reached.
+/// A head: number, source and reach.
 type Heads<'w, 's> = Query<'w, 's, (&'static Head, &'static Mounted, &'static HeadFrontier)>;
 
 pub(super) fn report_standing(
