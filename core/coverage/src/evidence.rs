@@ -47,7 +47,7 @@ pub struct Evidence {
     pub middle_t_y_m: f64,
     /// Distance by which the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
-    /// Numbers of the heads that passed without pinging.
+    /// Numbers of the heads that passed through the sections without pinging.
     #[serde(with = "head_numbers")]
     pub silent_heads: HeadSet,
 }

@@ -46,7 +46,8 @@ const SWINGS: f64 = 0.85;
 /// Share of the target above which a step along the wall, seen from the tunnel's centre, is a factor.
 const COARSE: f64 = 0.75;
 
-/// Determines the causes of a section's hole. `passages` come from all sections within T of this section.
+/// Determines the causes of a section's hole. `passages` come from all sections within the target T of this
+/// section.
 ///
 /// Allocates: never.
 pub fn explain<'a>(
@@ -133,7 +134,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(over > well_over || is_over_plan || is_over_all, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
     let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
-    // Above the planned speed, the passes of heads mounted apart along the hull may be evenly spread by
+    // Above the planned speed, the passes of heads at different places along the hull may be evenly spread by
     // chance.
     let is_fast = drive.speed_mps > OVER_PLAN * drive.planned_mps;
     add(is_slow || is_uneven || is_fast && drive.all_gap_s < HELPS * drive.healthy_at_plan_s, Cause::Phase);

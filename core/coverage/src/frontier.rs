@@ -91,7 +91,7 @@ pub struct Frontier {
     zone_moved: Option<MonoNs>,
     /// Time of the last ping of any head.
     heard: Option<MonoNs>,
-    /// Time of the first ping, and of each ping that ended a silence of all heads.
+    /// Time of the latest ping that ended a silence of all heads, or of the first ping.
     ///
     /// Before the first ping, this is the time of the first update.
     woken: Option<MonoNs>,
@@ -110,7 +110,7 @@ struct Course {
     heads: usize,
 }
 
-/// Hysteresis for a reversal of the course, m: yaw and tether slack cause smaller reversals.
+/// Hysteresis for a reversal of the course, m. Yaw and tether slack cause smaller reversals.
 const TURNED_M: f64 = 0.25;
 
 impl Course {

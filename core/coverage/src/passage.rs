@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn worse_drive_has_the_larger_distance_between_passes() {
+    fn drive_with_the_larger_distance_between_passes_is_the_worse_one() {
         let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
         assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
         assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));

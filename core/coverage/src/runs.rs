@@ -145,7 +145,7 @@ pub struct Runs {
     first: i64,
     join: i64,
     runs: Vec<Run>,
-    /// Number of the run plus one for each section, or zero.
+    /// For each section: number of its run plus one, or zero.
     member: Vec<u32>,
     /// Causes of each section of a run.
     failing: Vec<Failing>,

@@ -148,7 +148,7 @@ pub struct Section {
     pub deviation: Deviation,
     /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
-    /// Whether samples have landed within T of the section since it was last judged.
+    /// Whether samples have landed within the target T of the section since it was last judged.
     pub(super) stale: bool,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful: u32,
@@ -156,7 +156,7 @@ pub struct Section {
     pub suspect: bool,
     /// Number of the visit that was the newest one when this head became distrusted.
     suspected_in: u32,
-    /// Visits with samples within T of the section.
+    /// Visits with samples within the target T of the section.
     pub(super) visits: Visits,
     /// Number of the visit that the pass error in `passage` belongs to.
     passed_in: u32,

@@ -235,7 +235,7 @@ impl Sections {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Records a sample at `x_m`: every section within T of it is due for judging again.
+    /// Records a sample at `x_m`: every section within the target T of it is due for judging again.
     pub fn touch(&mut self, x_m: f64, visit: &Visit, profile: &Profile) {
         let (from, to) = (self.index_of(x_m - self.target_m), self.index_of(x_m + self.target_m));
         for index in from..=to {
@@ -395,7 +395,7 @@ impl Sections {
 
     /// Returns the error of a section's passes.
     ///
-    /// If no head pinged in the section, the result is the largest error within T / 2.
+    /// If no head pinged in the section, the result is the largest error within half the target.
     fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
@@ -425,7 +425,8 @@ impl Sections {
         runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// Determines the causes of a hole from the heads' passages through all sections within T of it.
+    /// Determines the causes of a hole from the heads' passages through all sections within the target T of
+    /// it.
     ///
     /// If the heads have left only a part of the section, the largest hole in this part counts.
     fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {

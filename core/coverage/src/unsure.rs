@@ -95,7 +95,7 @@ pub struct Driven {
     pub fits_mps: f64,
     /// Whether heads at their scheduled angles pass unevenly at this speed.
     ///
-    /// Heads apart along the hull are then out of phase.
+    /// Heads at different places along the hull are then out of phase.
     pub is_uneven: bool,
     /// Whether some heads were silent or detected no wall. The speeds nevertheless assume that all heads
     /// work.

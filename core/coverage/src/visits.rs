@@ -55,7 +55,7 @@ impl Visit {
     }
 }
 
-/// The visits of a section: those with samples within T of it.
+/// The visits of a section: those with samples within the target T of it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Visits {
     /// Number of the newest visit, its stretch of navigation, and the time of its last sample.

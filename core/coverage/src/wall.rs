@@ -54,7 +54,7 @@ const SLENDER: f64 = 4.0;
 struct Run {
     waiting: [PlacedReturn; MOST_WAITING],
     waits: u8,
-    /// First return of the run, including returns that no longer wait, and number of returns.
+    /// First return and number of returns of the run. Both include returns that no longer wait.
     first: Option<PlacedReturn>,
     all: u32,
     /// Largest distance of the run from the design, and its width, m.

@@ -25,7 +25,7 @@ pub struct HeadHealth {
     last_rad: f64,
     /// Angle turned since the last return, radians.
     unheard_rad: f64,
-    /// Angle turned with returns, radians; at most a turn.
+    /// Angle turned while returns came, radians; at most a turn.
     heard_rad: f64,
     /// Share of the latest returns that are off the design.
     elsewhere: f64,

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn head_in_a_sector_reverses_at_its_ends() {
+    fn head_that_sweeps_a_sector_reverses_at_the_sector_ends() {
         let (track, turned) = run((0..500).map(|k| {
             let phase = f64::from(k % 200);
             if phase <= 100.0 { phase * 0.9 } else { (200.0 - phase) * 0.9 }

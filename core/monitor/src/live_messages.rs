@@ -43,7 +43,7 @@ pub enum LiveMessage {
         #[serde(skip)]
         missed: Missed,
     },
-    /// End of the last flagged run is known.
+    /// The end of the last flagged run is known.
     FlagEnds {
         /// Number of the run.
         run: u32,
@@ -54,7 +54,7 @@ pub enum LiveMessage {
         /// Metres of the run that fail.
         failed_m: f64,
     },
-    /// A missed stretch was passed again, and none of its sections fails any more.
+    /// The vehicle has driven through a missed stretch again, and none of its sections fails any more.
     Cleared {
         /// Number of the run that was flagged.
         run: u32,
@@ -65,7 +65,7 @@ pub enum LiveMessage {
     },
     /// A stretch without a verdict has begun.
     CannotSay(UnsureStretch),
-    /// End of a stretch without a verdict is known.
+    /// The end of a stretch without a verdict is known.
     CannotSayEnds(UnsureStretch),
     /// Some heads have not been at the place where the vehicle began or turned back, and the vehicle is now
     /// well away from it.
@@ -328,7 +328,8 @@ impl LiveMessages {
         self.missed.push(whole);
     }
 
-    /// Reports the end of a missed stretch as it was reported, and then its parts without a verdict.
+    /// Reports that a missed stretch is cleared, with the bounds reported before. Then reports its parts
+    /// without a verdict.
     fn clear(&mut self, run: &Run, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(at) = self.missed.iter().position(|told| told.meets(run)) else { return };
         let Some(told) = self.missed.get(at).copied() else { return };

@@ -42,8 +42,8 @@ impl PilotLine {
         text
     }
 
-    /// The line broken to at most `columns`. Continuation lines are indented to where the text of the first
-    /// line begins.
+    /// The line, broken into lines of at most `columns` characters. Continuation lines are indented to where
+    /// the text of the first line begins.
     pub fn broken(&self, columns: usize) -> Vec<String> {
         let whole = self.text();
         if whole.chars().count() <= columns {

@@ -91,7 +91,7 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The ping a turn ago is counted: the wall was detected before and after it.
+            // The ping a turn ago is counted, because the wall was detected before and after it.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {
@@ -201,7 +201,7 @@ mod tests {
             }
             count.at_most()
         };
-        // 280 of the 400 pings of a turn are detected. An angle counts from its third detection on.
+        // In each turn, 280 of the 400 pings detect the wall. An angle counts from its third detection on.
         let early = at_most(0..1000);
         assert!(early.share > 0.3 && early.after_lost >= 1.0, "{early:?}");
         assert_eq!(at_most(1000..1100), LossRate::default());

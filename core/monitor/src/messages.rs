@@ -61,7 +61,7 @@ pub enum Outcome {
     Unplaced(NoFix),
 }
 
-/// Whether the vehicle occludes a beam, by the geometry of the vehicle.
+/// Whether the vehicle occludes a beam, according to the vehicle's geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Hidden {
     /// Not occluded.

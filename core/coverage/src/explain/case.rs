@@ -83,8 +83,8 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole. Of a hole larger than the target, only a part of the target's
-/// size counts.
+/// Whether every live head has swept the hole. If the hole is larger than the target, only a part of the
+/// target's size counts.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];

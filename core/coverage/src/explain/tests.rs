@@ -239,8 +239,8 @@ fn cause_has_the_same_word_in_text_and_json() {
     }
 }
 
-/// The fitting speed leaves time for a single pass. With losses, the same distance is driven in the time of
-/// all needed passes and one ping.
+/// The largest speed that meets the target leaves time for a single pass. With losses, the same distance is
+/// driven in the time of all needed passes and one ping.
 #[test]
 fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
     let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };

@@ -20,9 +20,9 @@ pub struct Needed<'a> {
 impl HoleFinder {
     /// Whether a circle of the required radius, centred between two chainages, is certain to remain empty.
     ///
-    /// The circle holds no sample and lies outside each of `reaches`: where samples may still land, or where not all
-    /// heads have been. The distance to the nearest sample or to the reach is 1-Lipschitz. As in the search for
-    /// holes, tiles whose bound is too small are dropped and the others are halved.
+    /// The circle holds no sample and lies outside each of `reaches`: where samples may still land, or where
+    /// some heads have not been. The distance to the nearest sample or to the reach is 1-Lipschitz. As in the
+    /// search for holes, tiles whose bound is too small are dropped and the others are halved.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle(

@@ -167,7 +167,7 @@ proptest! {
 
     /// In a small pipe, holes are wider than the perimeter.
     #[test]
-    fn pipe_narrower_than_its_holes_agrees_with_brute_force(
+    fn hole_wider_than_the_perimeter_agrees_with_brute_force(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
     ) {
         let hole = largest(1.1, &samples, 0.0, 0.5);

@@ -106,7 +106,7 @@ pub struct StoreUse {
     pub kept: u64,
     /// Number of samples dropped by thinning.
     pub thinned: u64,
-    /// Number of bytes in use now or before, which the OS has mapped.
+    /// Number of bytes that have been used so far, which the OS has mapped.
     pub bytes: usize,
 }
 

@@ -262,7 +262,7 @@ fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_the_centre() {
 
 /// Off the centre, a constant range agrees with the wall for a part of each turn.
 #[test]
-fn stuck_head_is_distrusted_until_its_range_moves() {
+fn stuck_head_is_distrusted_until_its_range_varies() {
     for (radius_m, out_m) in [(1.0, 0.3), (6.0, 1.0)] {
         let mut turning = Turning::new(radius_m, 1);
         let limits = turning.limits;

@@ -16,7 +16,7 @@ use headrace_sensor::reading::SourceId;
 
 /// Grace period after the first update. Data or positions that haven't arrived by its end count as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
-/// Time for which `CannotSay` stays active after its stretch has last grown.
+/// Time for which `CannotSay` stays active after the last growth of its stretch.
 const GROWS: DurNs = DurNs(10_000_000_000);
 /// Thresholds for the remaining cable, time and charge, percent, at which a warning, an alarm and an
 /// emergency alarm are raised.
@@ -29,7 +29,7 @@ const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
 /// alert ends.
 const MORE_PCT: f64 = 2.0;
 
-/// Data and positions seen so far.
+/// Record of the data and positions that have arrived so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Had {
     position: bool,

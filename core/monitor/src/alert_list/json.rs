@@ -91,7 +91,7 @@ pub struct SettingJson {
     ///
     /// It is an angle about the head's axis, a pitch or a yaw.
     pub angle_deg: Option<f64>,
-    /// Difference from the correct value, in standard deviations.
+    /// Difference between the file's value and the correct one, in standard deviations.
     pub sure_ratio: f64,
 }
 

@@ -166,8 +166,8 @@ fn happens() -> impl Strategy<Value = Happens> {
 }
 
 proptest! {
-    /// After any conditions and operator commands, every alert is in the state that the table of MSC.302(87)
-    /// gives.
+    /// After an arbitrary sequence of conditions and operator commands, every alert is in the state that the
+    /// table of MSC.302(87) gives.
     #[test]
     fn alert_life_cycle_follows_the_msc_table(
         steps in proptest::collection::vec((happens(), 1usize..8), 1..120),

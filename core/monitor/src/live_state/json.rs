@@ -1,5 +1,5 @@
-//! The live state as JSON. It has plain values with units in their names, ages up to the tick, and a mark on
-//! stale data.
+//! The live state as JSON. It has plain values with units in their names. Ages are measured up to the tick,
+//! and stale data is marked.
 //!
 //! `docs/reference/live-state.schema.json` is the schema. Allocates: outlets' threads only, never the loop's.
 

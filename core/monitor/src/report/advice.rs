@@ -17,8 +17,8 @@ pub struct AdviceReport {
     pub speed_mps: f64,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,
-    /// Speed below which heads apart along the hull run out of phase, m/s; zero if a lower speed always
-    /// helps.
+    /// Speed below which heads at different places along the hull run out of phase, m/s; zero if a lower
+    /// speed always helps.
     pub from_mps: f64,
     /// Speed nearest to the present one that meets the target, m/s; `None` if the present speed meets it.
     pub nearest_mps: Option<f64>,

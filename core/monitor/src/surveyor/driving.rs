@@ -19,7 +19,8 @@ use headrace_sampling::swing::Looks;
 
 /// Longest time between neighbouring passes for which the rotation of the vehicle is looked up, seconds.
 const LONGEST_S: f64 = 50.0;
-/// Relative change of the time between passes above which the fitting speed is computed again.
+/// Relative change of the time between passes above which the fitting speed, the largest one that meets the
+/// target, is computed again.
 const SAME_PASSES: f64 = 0.01;
 /// Search for the fitting speed: number of speeds tried, and ratio of each speed to the previous one.
 const SLOWER: u32 = 80;
@@ -100,7 +101,7 @@ impl Driving {
         let place_m = [pose.position.y(), pose.position.z()];
         self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
-        // Two neighbouring passes may belong to heads apart along the hull.
+        // Two neighbouring passes may belong to heads at different places along the hull.
         let apart_s = apart_m(situation) / situation.speed_mps.abs().max(SLOW_MPS);
         let since = at - DurNs::from_secs_f64((self.now.healthy_gap_s + apart_s).min(LONGEST_S));
         let turned_rad = self.looks.turned_since(look, since);
@@ -108,7 +109,8 @@ impl Driving {
         self.looks.keep(at, look);
     }
 
-    /// Updates the fitting speed if the heads' passes have changed.
+    /// Updates the fitting speed, which is the largest one that meets the target, if the heads' passes have
+    /// changed.
     fn note_fit(&mut self, healthy: &Situation, plan: &Plan) {
         let now = &mut self.now;
         let Plan { target_m, confidence_sd, .. } = *plan;

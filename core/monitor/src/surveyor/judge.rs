@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn fail_is_published_with_its_run_and_unsure_section_with_its_stretch() {
+    fn fail_publishes_its_run_and_unsure_section_publishes_its_stretch() {
         let mut coverage = coverage();
         let (notices, runs) = judged(&mut coverage, 40, -20.0);
         let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };
@@ -164,8 +164,8 @@ mod tests {
         assert_eq!((notices, coverage.unsure), (vec![run, section], None));
         let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_beat, run.at));
         assert_eq!(found.collect::<Vec<_>>(), [(RunId(0), RunChange::Raised, 3, true, AT)]);
-        // If not all heads have passed, there is no verdict. Neighbouring sections form one stretch, and a
-        // distant section another.
+        // There is no verdict if some heads have not been in the section. Neighbouring sections without a
+        // verdict form one stretch, and a distant section forms another.
         for (section, from, to, sections) in [(20, 20, 21, 1), (21, 20, 22, 2), (60, 60, 61, 1)] {
             let (notices, runs) = judged(&mut coverage, section, 20.0);
             assert_eq!((notices.len(), runs.len()), (1, 0));

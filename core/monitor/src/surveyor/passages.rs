@@ -100,7 +100,7 @@ mod tests {
     /// A ping is no evidence of the speed if two standard deviations against the previous pass reach the
     /// target. The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn ping_with_an_uncertain_position_does_not_count_for_the_speed() {
+    fn ping_with_an_uncertain_position_is_no_evidence_of_the_speed() {
         let profile = pipe();
         let noted = |sd_m: f64| {
             let mut coverage = coverage();

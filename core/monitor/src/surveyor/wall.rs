@@ -274,7 +274,7 @@ mod tests {
     /// An isolated echo in front of the wall waits for the next return. Then it counts as missing, for holes
     /// and for causes.
     #[test]
-    fn isolated_echo_counts_as_a_missing_sample_at_its_aim() {
+    fn isolated_echo_counts_as_a_missing_sample_at_the_aimed_wall_point() {
         for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {
             let mut bench = Bench::new();
             assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
