@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn section_is_left_behind_once_the_last_head_is_a_margin_past_it() {
+    fn section_is_left_behind_once_the_last_head_is_past_it_by_the_margin() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);

@@ -36,7 +36,7 @@ pub struct Run {
     pub failed: u32,
     /// Section with the largest hole, and this hole.
     ///
-    /// In a cleared run, both are as of the time before the run was cleared.
+    /// In a cleared run, both are those from before the run was cleared.
     pub worst: (i64, Hole),
     /// Time of the run's first flag.
     pub raised: MonoNs,

@@ -118,7 +118,7 @@ impl Adviser {
         self.report(into);
     }
 
-    /// Advice before the next tick, with room for any tick. Allocates: all memory of the list.
+    /// Advice before the next tick, with room for a tick of any size. Allocates: all memory of the list.
     pub(super) fn advised_with_room(&self) -> Advised {
         let mut advised = Advised { entries: Vec::with_capacity(MAX_TICK_PACKETS), ..Advised::default() };
         advised.stream.reserve_as(&self.part.world.resource::<AdviceStream>().0);

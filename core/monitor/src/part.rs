@@ -155,7 +155,7 @@ impl<S: Stage> Part<S> {
 
     /// Restores the state.
     ///
-    /// Errors: the snapshot is of another vehicle or version.
+    /// Errors: the snapshot comes from another vehicle or version.
     pub(super) fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
         let Self { world, entities, state, .. } = self;
         state.iter().try_for_each(|state| {

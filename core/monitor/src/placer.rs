@@ -169,7 +169,7 @@ impl Placer {
         debug_assert!(into.commands.0.is_sorted_by_key(|command| command.before), "commands are in order");
     }
 
-    /// Results before the next tick, with room for any tick. Allocates: all memory of the lists.
+    /// Results before the next tick, with room for a tick of any size. Allocates: all memory of the lists.
     pub(super) fn placed_with_room(&self) -> Placed {
         let mut placed = Placed {
             inbox: Inbox::with_room(),

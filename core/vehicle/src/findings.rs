@@ -325,7 +325,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn connections_to_one_end_are_recognised_in_any_notation() {
+    fn connections_to_the_same_end_are_recognised_in_every_notation() {
         let parse = |text: &str| Connect::parse(text).unwrap();
         for (a, b, expected) in [
             ("serial:/dev/a?baud=9600", "serial:/dev/a", Some("serial port")),

@@ -24,7 +24,7 @@ use headrace_sampling::head::MAX_HEADS;
 const OPEN_BRICKS: usize = 64;
 /// Minimum length of a brick, m.
 const BRICK_M: f64 = 1.0;
-/// Maximum number of rows per brick: an open brick has a bit for each row in a `u32`.
+/// Maximum number of rows per brick, because an open brick has a bit for each row in a `u32`.
 const MOST_ROWS: usize = 32;
 /// Maximum number of samples in all open bricks.
 const OPEN_SAMPLES: usize = 1 << 18;

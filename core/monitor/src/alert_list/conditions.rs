@@ -121,7 +121,8 @@ impl AlertList {
             .advice
             .as_ref()
             .map_or(Figures::None, |advice| Figures::Advice(AdviceFigures::of(advice, speed_mps)));
-        // Slightly over v_max the alert stays as it is: that range of speeds is its dead band.
+        // Slightly over v_max the alert neither begins nor ends, because that range of speeds is its dead
+        // band.
         let is_over = condition == Condition::Over && self.is_active(ListKind::TooFast, None);
         let too_fast = condition == Condition::TooFast || is_over;
         self.observe(at, &Seen::of(ListKind::TooFast, too_fast, figures), to);

@@ -295,7 +295,7 @@ fn higher_priority_needs_a_new_acknowledgement() {
 
 /// Later occurrences only update the figures of the active alert. They publish no notice.
 #[test]
-fn occurrences_update_the_figures_without_a_notice() {
+fn later_occurrences_update_the_alert_figures_and_publish_no_notice() {
     let mut bench = Bench::new(0.0, 5.0);
     let mut state = crate::live_state::test_state();
     let mut beat = |bench: &mut Bench, at: MonoNs, occurrences: Occurrences| {

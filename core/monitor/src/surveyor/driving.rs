@@ -293,7 +293,7 @@ mod tests {
     /// Four heads are a quarter of a turn apart and turn in 8 s. Without one of them, the longest gap is half
     /// a turn.
     #[test]
-    fn stalled_head_counts_as_stalled_until_back_in_phase() {
+    fn stalled_head_counts_as_stalled_until_it_is_back_in_phase() {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
@@ -381,7 +381,7 @@ mod tests {
 
     /// The farther the vehicle is from the centre, the longer is a step on the opposite wall.
     #[test]
-    fn steps_are_recomputed_after_5_cm_sideways_or_a_new_head_step() {
+    fn steps_are_recomputed_after_a_5_cm_move_sideways_or_a_changed_head_step() {
         let profile = shapes::circle(3.0).unwrap();
         let mut driving = Driving::default();
         let mut t_y_m = |aside_m: f64, finer: f64| {

@@ -177,7 +177,7 @@ mod tests {
 
     /// The runs that remain of a cleared run take over its alert, so the list must have these runs first.
     #[test]
-    fn cleared_runs_come_last_and_runs_without_room_are_dropped() {
+    fn cleared_runs_come_last_and_runs_beyond_the_capacity_are_dropped() {
         let mut coverage = coverage();
         for section in [20, 40, 60] {
             judged(&mut coverage, section, -20.0);

@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_without_room_are_counted() {
+    fn samples_are_counted_if_the_store_has_no_room() {
         let mut bench = Bench::new();
         let perimeter_m = bench.tunnel.profile.perimeter_m();
         let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 32.0, cell_m: 0.25, capacity: 2 };
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn returns_beyond_the_tunnel_are_counted_with_their_largest_distance() {
+    fn returns_beyond_the_tunnel_are_counted_and_the_largest_distance_is_kept() {
         let mut bench = Bench::new();
         let mut note = |x_m: f64| {
             bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });

@@ -95,7 +95,7 @@ fn all_of(causes: &[Cause]) -> Causes {
 
 /// At angles assumed to be hidden, losses are due to occlusion, unless other pings there do detect the wall.
 #[test]
-fn loss_at_hidden_angle_is_a_missing_return_once_other_pings_return() {
+fn loss_at_an_occluded_angle_is_a_missing_return_once_other_pings_there_detect_wall() {
     let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
     let aim = Some(Aim { x_m: 3.0, arc_m: 2.0 });
     let lost = |loss: Loss| away(5, Outcome::Lost(loss, aim));
