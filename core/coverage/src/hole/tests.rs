@@ -177,7 +177,7 @@ proptest! {
 
     /// On a lattice, every local maximum is equidistant from four samples.
     #[test]
-    fn hole_of_a_lattice_is_as_wide_as_the_lattice_diagonal(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
+    fn lattice_hole_is_as_wide_as_the_lattice_diagonal(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
         let darc = PERIMETER_M / f64::from(around);
         let mut samples = Vec::new();
         for i in -12..=12 {
