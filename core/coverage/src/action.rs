@@ -15,7 +15,7 @@ pub enum Action {
     LongerRange,
     /// Roll the vehicle so that it occludes another part of the wall.
     ///
-    /// If the vehicle turned round, it would occlude the same part.
+    /// To turn the vehicle round would not help: it would occlude the same part.
     OtherSide,
     /// Stay centred in the tunnel, with a steady heading.
     Middle,
@@ -53,7 +53,7 @@ impl Action {
 
     /// Actions against several causes, in the order of the causes and without duplicates.
     ///
-    /// `is_beyond_speed` means that no speed makes up for the missing returns.
+    /// `is_beyond_speed` means that so many returns are missing that no speed makes up for them.
     pub fn against(causes: impl IntoIterator<Item = Cause>, is_beyond_speed: bool) -> Vec<Self> {
         let mut actions: Vec<Self> = Vec::new();
         for cause in causes {

@@ -20,7 +20,7 @@ pub enum Cause {
     Phase,
     /// The hole extends beyond the stretch that all live heads have swept.
     NotPassed,
-    /// A head passed without pinging.
+    /// A head passed through the section without pinging.
     HeadSilent,
     /// A head was stalled, or has been out of phase since a stall.
     HeadStalled,

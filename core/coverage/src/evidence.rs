@@ -47,14 +47,14 @@ pub struct Evidence {
     pub middle_t_y_m: f64,
     /// Distance by which the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
-    /// Numbers of the heads that passed without pinging.
+    /// Numbers of the heads that passed through the sections without pinging.
     #[serde(with = "head_numbers")]
     pub silent_heads: HeadSet,
 }
 
 impl Evidence {
-    /// Whether causes and figures agree: the main cause is a cause, shares are from 0 to 1, and losses allow no speed
-    /// above the fitting one.
+    /// Whether causes and figures agree: the main cause is among the causes, shares are from 0 to 1, and
+    /// `with_losses_mps` is at most `fits_mps`.
     pub fn is_consistent(&self) -> bool {
         let shares = [self.missing_share, self.occluded_share, self.standing_share];
         self.causes.has(self.cause)
@@ -62,7 +62,7 @@ impl Evidence {
             && (0.0..=self.fits_mps).contains(&self.with_losses_mps)
     }
 
-    /// Causes and speed of the section, for the counts of its run.
+    /// Returns causes and speed of the section, which its run counts.
     pub fn failing(&self) -> Failing {
         Failing { causes: self.causes, again_mps: self.with_losses_mps }
     }

@@ -19,7 +19,7 @@ pub struct Reach {
     pub to_m: f64,
 }
 
-/// Reach of one head: its current stretch, and the stretch of all its samples so far.
+/// Reach of one head: the stretch where its samples land now, and the stretch of all its samples so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
     /// Receive time of the head's last ping, with or without a fix; `None` before the first.
@@ -81,7 +81,7 @@ pub struct Frontier {
     ///
     /// Heads count whether they ping or not.
     way: Option<Reach>,
-    /// Stretch that all heads, pinging or not, have passed with their whole combined reach.
+    /// Stretch where all heads, pinging or not, have been: the whole combined reach has moved across it.
     ///
     /// The stretch is empty (`from_m` above `to_m`) until such a place exists.
     through: Option<Reach>,
@@ -91,7 +91,7 @@ pub struct Frontier {
     zone_moved: Option<MonoNs>,
     /// Time of the last ping of any head.
     heard: Option<MonoNs>,
-    /// Time of the first ping, and of each ping that ended a silence of all heads.
+    /// Time of the latest ping that ended a silence of all heads, or of the first ping.
     ///
     /// Before the first ping, this is the time of the first update.
     woken: Option<MonoNs>,
@@ -110,7 +110,7 @@ struct Course {
     heads: usize,
 }
 
-/// Hysteresis for a reversal of the course, m: yaw and tether slack cause smaller reversals.
+/// Hysteresis for a reversal of the course, m. Yaw and tether slack cause smaller reversals.
 const TURNED_M: f64 = 0.25;
 
 impl Course {
@@ -147,7 +147,7 @@ pub struct Outlook {
     ///
     /// Not all heads have been in this stretch. On the present course, the other heads will not reach it.
     pub not_passed: Option<Reach>,
-    /// Stretch that all heads, pinging or not, have passed; `None` before.
+    /// Stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub through: Option<Reach>,
     /// Zone of sections in reach if it has been unchanged for longer than [`SILENT_AFTER`].
     ///
@@ -202,7 +202,7 @@ impl Frontier {
 
     /// Returns the zone if the vehicle is nearly stationary.
     ///
-    /// `None` within [`SILENT_AFTER`] of the first ping: the live heads are not known yet.
+    /// `None` within [`SILENT_AFTER`] of the first ping, because the live heads are not known yet.
     fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
         let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT_AFTER.0);
         self.zone.clone().filter(|_| over(self.woken) && over(self.zone_moved))
@@ -259,7 +259,7 @@ impl Frontier {
             Some(Reach { from_m: through.from_m.min(all.to_m), to_m: through.to_m.max(all.from_m) });
     }
 
-    /// Returns the stretch that all heads, pinging or not, have passed; `None` before.
+    /// Returns the stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub fn through(&self) -> Option<Reach> {
         self.through.filter(|through| through.from_m <= through.to_m)
     }
@@ -299,10 +299,10 @@ impl Frontier {
         self.move_zone(heads, now, section_m, margin_m)
     }
 
-    /// Updates the frontier at `now`; vehicle and heads, pinging or not, are within `span`.
+    /// Updates the frontier for an update at `now`. `span` covers the vehicle and its heads, pinging or not.
     ///
-    /// `heads` are the reaches of all heads; silent heads are at the places where they would ping. While a head is
-    /// alive, only pings move the zone.
+    /// `heads` are the reaches of all heads; silent heads are at the places where they would ping. While a
+    /// head is alive, only pings move the zone.
     pub fn beat(
         &mut self,
         span: Reach,
@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn section_is_left_behind_once_the_last_head_is_a_margin_past_it() {
+    fn section_is_left_behind_once_the_last_head_is_past_it_by_the_margin() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
@@ -531,7 +531,7 @@ mod tests {
     }
 
     #[test]
-    fn stretch_passed_by_all_heads_runs_from_front_start_to_rear_end() {
+    fn stretch_where_all_heads_have_been_runs_from_front_head_start_to_rear_head_end() {
         let mut frontier = Frontier::default();
         let at = |x_m: f64| Reach { from_m: x_m - 0.5, to_m: x_m + 0.5 };
         assert_eq!((frontier.through(), frontier.not_passed()), (None, None));

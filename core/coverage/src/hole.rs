@@ -29,7 +29,7 @@ mod window;
 pub use certain::Needed;
 pub use hypothetical::WallChanges;
 
-/// Maximum search radius, m: wall farther than this from any sample counts as not passed.
+/// Maximum search radius, m. Wall farther than this from every sample counts as wall that no head has swept.
 pub const FARTHEST_M: f64 = 12.0;
 /// Half diagonal below which a tile isn't halved, m.
 ///
@@ -278,7 +278,7 @@ impl HoleFinder {
         let mut within_m = reach_m;
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
             let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
-            // f is 1-Lipschitz.
+            // f is 1-Lipschitz, and the next tile's centre is one tile edge away. This bounds its search.
             within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_arc_m + 1e-6;
             self.tiles.push(tile);
         }

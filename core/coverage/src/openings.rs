@@ -138,7 +138,7 @@ mod tests {
         assert!((all_round.share_of(5.0, 5.25, &profile) - 1.0).abs() < 1e-12);
     }
 
-    /// Samples fill 2 m by 4 m every 5 cm, or every 2 cm for a target of 0.2 m.
+    /// An opening of 2 m by 4 m is filled with samples every 5 cm, or every 2 cm for a target of 0.2 m.
     #[test]
     fn number_of_samples_filled_into_an_opening_equals_the_predicted_number() {
         let profile = shapes::circle(3.0).unwrap();

@@ -106,7 +106,7 @@ mod tests {
 
     /// The largest circle between 5 m and 5.6 m measures 0.63 m.
     ///
-    /// If the circle's centre is within a quarter of a metre of 5 m, it measures 0.54 m.
+    /// With its centre within a quarter of a metre of 5 m, the largest circle measures 0.54 m.
     #[test]
     fn verdicts_for_another_target_use_the_measured_holes() {
         let seen = Seen::new();

@@ -29,7 +29,7 @@ pub struct Passage {
     pub standing: u32,
     /// Heads that passed through the section without a ping.
     pub silent: HeadSet,
-    /// Driving figures at the moment of the largest T.
+    /// Driving figures at the moment of the largest spacing T.
     pub drive: Drive,
     /// Whether more pings without a fix were made than are stored.
     pub unseen: bool,
@@ -140,16 +140,17 @@ impl Drive {
 
     /// Whether the heads are out of phase because the vehicle is slower than planned.
     ///
-    /// True if passes are farther apart by a factor above `over` than at the planned speed with the heads at their
-    /// scheduled angles. Heads apart along the hull are in phase only near the planned speed. The planned speed must
-    /// also meet the target: no speed helps heads that were started with wrong phases.
+    /// True if passes are farther apart, by a factor above `over`, than at the planned speed with the heads
+    /// at their scheduled angles. Heads at different places along the hull are in phase only near the planned
+    /// speed. The planned speed must also meet the target, because no speed helps heads that were started
+    /// with wrong phases.
     pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
         let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
         let fits = self.fits_mps >= self.planned_mps;
         is_slower && fits && self.planned_along_m() > over * self.planned_mps * self.all_gap_s
     }
 
-    /// Returns the drive with the larger distance between passes.
+    /// Returns the drive with the larger distance between passes, which is the worse one.
     #[must_use]
     pub fn or_worse(self, other: Self) -> Self {
         if other.along_m() > self.along_m() { other } else { self }
@@ -272,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn worse_drive_has_the_larger_distance_between_passes() {
+    fn drive_with_the_larger_distance_between_passes_is_the_worse_one() {
         let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
         assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
         assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));

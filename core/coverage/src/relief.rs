@@ -9,7 +9,7 @@ use headrace_sampling::head::MAX_HEADS;
 
 /// Number of bins around the perimeter; a bin is about as wide as a step of a head.
 const BINS: i64 = 128;
-/// Number of bins along the tunnel, each half a reach long.
+/// Number of bins along the tunnel. Each is half of `WallLimits::reach_m` long.
 ///
 /// In a tunnel of 6 m radius, all bins together are 9 m long, which exceeds the distance between heads.
 const SLABS: i64 = 32;
@@ -21,7 +21,8 @@ struct Cell {
     slab: i64,
     /// The latest return off the design, and whether it was classified as wall.
     off: Option<(PlacedReturn, bool)>,
-    /// Bitmasks of heads whose returns in this bin agree with the design, and contradict the design.
+    /// Bitmasks of the heads whose returns in this bin agree with the design, and of those whose returns
+    /// contradict it.
     as_designed: u8,
     contradicting: u8,
 }
@@ -38,7 +39,7 @@ pub struct Ballot {
     between_m: Option<[f64; 2]>,
 }
 
-/// Number of votes needed for a decision: about the bins of a turn.
+/// Number of votes needed for a decision: about one per bin of a turn.
 const FULL_BALLOT: u32 = 128;
 
 impl Ballot {
@@ -81,7 +82,7 @@ pub struct Relief {
     ballots: [Ballot; MAX_HEADS],
     /// Bitmask of heads that aren't trusted.
     distrusted: u8,
-    /// Bitmask of heads whose range changes as the range to the design does.
+    /// Bitmask of heads whose range varies when the range to the design varies.
     changing: u8,
 }
 
@@ -204,14 +205,14 @@ impl Relief {
         set(&mut self.distrusted, head, !believed);
     }
 
-    /// Records whether the range of a head changes as the range to the design does.
+    /// Records whether the range of a head varies when the range to the design varies.
     pub(super) fn note_changing(&mut self, head: usize, changes: bool) {
         set(&mut self.changing, head, changes);
     }
 
-    /// Whether the range of another head changes as the range to the design does.
+    /// Whether the range of another head varies when the range to the design varies.
     ///
-    /// If so, no error of the estimate explains this head's constant range.
+    /// If so, no error of the estimated position explains a constant range of this head.
     pub(super) fn others_change(&self, head: usize) -> bool {
         self.changing & !bit(head) != 0
     }

@@ -13,7 +13,7 @@ use headrace_geometry::time::MonoNs;
 /// Across a wider gap, the speed that one section needs is no evidence for the next section.
 const JOIN_M: f64 = 0.5;
 
-/// Number of a run, which is never used again.
+/// Number of a run. It is never used for another run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
@@ -36,7 +36,7 @@ pub struct Run {
     pub failed: u32,
     /// Section with the largest hole, and this hole.
     ///
-    /// In a cleared run, both are as of the time before the run was cleared.
+    /// In a cleared run, both are those from before the run was cleared.
     pub worst: (i64, Hole),
     /// Time of the run's first flag.
     pub raised: MonoNs,
@@ -68,7 +68,8 @@ impl Run {
         self.counts.get(cause as usize).copied().unwrap_or(0)
     }
 
-    /// Causes named in texts: the main cause, and the next one if a tenth of the sections have it.
+    /// Causes named in texts: the main cause, and the next most frequent one if at least a tenth of the
+    /// sections have it.
     pub fn named(&self) -> Causes {
         let others = Cause::ALL.into_iter().filter(|cause| *cause != self.cause);
         let next = others.rev().max_by_key(|cause| self.count(*cause));
@@ -112,7 +113,7 @@ impl Run {
         self.tally.remove(section)
     }
 
-    /// Resets the counts.
+    /// Resets the counts to zero.
     fn count_none(&mut self) {
         self.counts.fill(0);
         self.tally = Tally::default();
@@ -144,7 +145,7 @@ pub struct Runs {
     first: i64,
     join: i64,
     runs: Vec<Run>,
-    /// Number of the run plus one for each section, or zero.
+    /// For each section: number of its run plus one, or zero.
     member: Vec<u32>,
     /// Causes of each section of a run.
     failing: Vec<Failing>,

@@ -15,7 +15,7 @@ use headrace_geometry::tunnel::Profile;
 /// Coverage verdict of a section. Source: docs/why/coverage.md, "Verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Undecided: samples may still land, or not all heads have passed the section.
+    /// Undecided: samples may still land, or some heads have not been in the section.
     ///
     /// Samples count only if they may land without the vehicle turning back.
     #[default]
@@ -124,11 +124,12 @@ pub struct Section {
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
-    /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
+    /// Whether the verdict is final on the present course: no further sample can change it, or the hole of a
+    /// fail.
     pub settled: bool,
     /// Whether the section is open although no sample can change it without the vehicle turning back.
     ///
-    /// The vehicle began or turned back in this section, so not all heads have passed it.
+    /// The vehicle began or turned back in this section, so some heads have not been in it.
     pub not_inspected: bool,
     /// Time at which the fail was flagged.
     pub flagged: Option<MonoNs>,
@@ -136,7 +137,7 @@ pub struct Section {
     pub cleared: Option<MonoNs>,
     /// Causes of the fail.
     pub evidence: Option<Evidence>,
-    /// Whether the causes were found when the heads had left only a part of the section.
+    /// Whether the causes were determined while the heads had left only a part of the section.
     pub(super) explained_in_part: bool,
     /// Ping statistics of the passage through the section.
     pub passage: Passage,
@@ -152,15 +153,15 @@ pub struct Section {
     pub deviation: Deviation,
     /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
-    /// Whether samples have landed within T of the section since it was last judged.
+    /// Whether samples have landed within the target T of the section since it was last judged.
     pub(super) stale: bool,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful: u32,
     /// Whether the section holds samples of a head that was distrusted soon after.
     pub suspect: bool,
-    /// Number of the newest visit when this head became distrusted.
+    /// Number of the visit that was the newest one when this head became distrusted.
     suspected_in: u32,
-    /// Visits with samples within T of the section.
+    /// Visits with samples within the target T of the section.
     pub(super) visits: Visits,
     /// Number of the visit that the pass error in `passage` belongs to.
     passed_in: u32,
@@ -225,14 +226,16 @@ impl Section {
 
     /// Returns the reason why a small hole is no evidence of coverage; `None` if it is evidence.
     ///
-    /// The returns accepted as wall may be something else, or the relative positions of the samples may be uncertain.
+    /// The returns accepted as wall may come from something else, or the positions of the samples relative to
+    /// one another may be uncertain.
     pub(super) fn doubt(&self) -> Option<Unsure> {
         let of_heads = self.suspect.then_some(Unsure::DistrustedHead);
         let of_places = self.visits.are_unrelated().then_some(Unsure::SeveralStretches);
         self.wall_doubt().or(of_heads).or(of_places)
     }
 
-    /// Returns the reason why most returns accepted as wall may be something else.
+    /// Returns the reason why most of the returns accepted as wall may come from something else; `None` if
+    /// there is no such reason.
     pub(super) fn wall_doubt(&self) -> Option<Unsure> {
         Some(match self {
             _ if self.contradicts() => Unsure::ContradictedProfile,
@@ -295,7 +298,7 @@ pub struct Metres {
     pub cannot_say_m: f64,
     /// Metres that further driving may still fill.
     pub open_m: f64,
-    /// Metres at the ends of the coverage extent that not all heads have passed.
+    /// Metres at the ends of the coverage extent where some heads have not been.
     ///
     /// Further driving on the present course does not change them.
     pub not_inspected_m: f64,

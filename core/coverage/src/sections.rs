@@ -35,9 +35,9 @@ pub struct Request {
     pub none_alive: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Stretch that not all heads have passed, and will not pass without the vehicle turning back.
+    /// Stretch where some heads have not been, and will not be unless the vehicle turns back.
     pub not_passed: Option<Reach>,
-    /// Stretch that all heads have passed; `None` before the end of the dive.
+    /// Stretch where all heads have been; `None` before the end of the dive.
     pub ended: Option<Ended>,
     /// Whether to judge only a certain fail: a large empty circle in which no more samples can land.
     ///
@@ -45,12 +45,12 @@ pub struct Request {
     pub only_fails: bool,
 }
 
-/// Stretch that all heads had passed when the dive ended; `None` if there is none.
+/// Stretch where all heads have been when the dive ends; `None` if there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ended(pub Option<Reach>);
 
 impl Ended {
-    /// Whether a hole extends to wall that not all heads have passed.
+    /// Whether a hole extends to wall where some heads have not been.
     fn is_beyond(self, hole: &Hole) -> bool {
         let radius_m = hole.diameter_m / 2.0;
         self.0.is_none_or(|all| hole.x_m - radius_m < all.from_m || hole.x_m + radius_m > all.to_m)
@@ -59,11 +59,11 @@ impl Ended {
 
 /// Default confidence of a pass or a fail.
 ///
-/// The confidence is the number of standard deviations of D between hole and target.
+/// The confidence is the number of standard deviations of D by which the hole must differ from the target.
 pub const CONFIDENCE_SD: f64 = 2.0;
 
 impl Request {
-    /// Returns a builder of requests with the outlook's time and stretches.
+    /// Returns a function that makes a request for a section, with the outlook's time and stretches.
     pub fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
         let Outlook { at, swept_by_all, none_alive, to_come, not_passed, .. } = *outlook;
         move |section| Self {
@@ -102,7 +102,7 @@ pub struct Judging<'a> {
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
-/// All sections of the stretch of tunnel that the store covers, and the runs of those that are flagged.
+/// All sections of the stretch of tunnel that the store covers, and the runs of flagged sections.
 #[derive(Debug, Clone)]
 pub struct Sections {
     section_m: f64,
@@ -235,7 +235,7 @@ impl Sections {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Records a sample at `x_m`: every section within T of it is due for judging again.
+    /// Records a sample at `x_m`: every section within the target T of it is due for judging again.
     pub fn touch(&mut self, x_m: f64, visit: &Visit, profile: &Profile) {
         let (from, to) = (self.index_of(x_m - self.target_m), self.index_of(x_m + self.target_m));
         for index in from..=to {
@@ -286,8 +286,8 @@ impl Sections {
         let alone = verdict(&hole, error_m, target_m, clear_m);
         section.not_inspected = section.verdict == Verdict::Open && alone != Verdict::Open;
         if section.not_inspected {
-            // The largest hole extends to wall that not all heads have passed. Another hole may still make the
-            // section fail.
+            // The largest hole extends to wall where some heads have not been. Another hole may still make
+            // the section fail.
             let radius_m = f64::midpoint(target_m, error_m);
             section.settled &=
                 clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
@@ -395,7 +395,7 @@ impl Sections {
 
     /// Returns the error of a section's passes.
     ///
-    /// If no head pinged in the section, the result is the largest error within T / 2.
+    /// If no head pinged in the section, the result is the largest error within half the target.
     fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
@@ -425,7 +425,8 @@ impl Sections {
         runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// Determines the causes of a hole, from the passages of the sections within T.
+    /// Determines the causes of a hole from the heads' passages through all sections within the target T of
+    /// it.
     ///
     /// If the heads have left only a part of the section, the largest hole in this part counts.
     fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {

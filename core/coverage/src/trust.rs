@@ -12,7 +12,7 @@ use headrace_geometry::math;
 pub enum Distrust {
     /// Most successive returns of the head disagree; the value is their mean difference.
     Scattered(f64),
-    /// The head's range is constant although the range to the design changes; the value is the head's range.
+    /// The head's range is constant although the range to the design varies; the value is the head's range.
     Constant(f64),
     /// The head contradicts the design where other heads agree with it; the value is the mean deviation.
     Outvoted(f64),
@@ -34,7 +34,7 @@ pub struct Beam<'a> {
 pub(super) struct Others {
     /// Votes on the head.
     pub(super) ballot: Ballot,
-    /// Whether another head's range changes as the range to the design does.
+    /// Whether another head's range varies when the range to the design varies.
     pub(super) change: bool,
 }
 
@@ -76,7 +76,7 @@ impl HalfTurn {
         self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
     }
 
-    /// Whether more than one in `parts` returns has a constant range.
+    /// Whether the range is constant in more than one of `parts` returns.
     ///
     /// The range to the design must vary widely for these returns.
     fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
@@ -86,7 +86,7 @@ impl HalfTurn {
             && span_m(self.design_m) > VARIES * limits.tolerance_m
     }
 
-    /// Whether more than one in `parts` returns disagrees with its neighbours.
+    /// Whether more than one of `parts` returns disagrees with its neighbours.
     fn has_one_in(&self, parts: u32) -> bool {
         parts * self.jumps.max(self.doubtful) > self.returns
     }
@@ -98,19 +98,21 @@ const FEW: u32 = 20;
 ///
 /// The share corresponds to some quanta of a profiling sonar.
 const UNCHANGED: f64 = 0.2;
-/// Maximum difference between runs of unchanged range that count as one constant range.
-///
-/// The difference is a share of the tolerance.
+/// Maximum difference between runs of unchanged range that count as one constant range, as a share of the
+/// tolerance.
 const CONSTANT: f64 = 0.6;
-/// Variation of the range to the design that a constant range contradicts, in tolerances.
+/// A constant range contradicts the design if the range to the design varies by more than this multiple of
+/// the tolerance.
 const VARIES: f64 = 2.0;
 /// Number of successive returns that make a run of unchanged range.
 ///
 /// A few neighbouring returns of a wall may have nearly the same range.
 const RUN: u32 = 8;
-/// Variation of the design's range that an exactly constant range contradicts, in tolerances.
+/// An exactly constant range contradicts the design if the range to the design varies by more than this
+/// multiple of the tolerance.
 ///
-/// This limit applies if another head's range changes. In a round tunnel, the range to the design varies if the
+/// This limit applies if another head's range varies when the range to the design varies. Without this
+/// condition, a constant range may be correct: in a round tunnel, the range to the design also varies if the
 /// vehicle is beside its estimated place.
 const STUCK_VARIES: f64 = 1.0;
 

@@ -13,7 +13,7 @@ use super::passage::{Drive, Passage};
 pub enum Unsure {
     /// The coverage extent begins, or the vehicle turned back, in the section.
     ///
-    /// Not all heads have passed the section.
+    /// Some heads have not been in the section.
     NotInspected,
     /// The hole is within its error of the target, because position errors are too large.
     Position,
@@ -95,13 +95,14 @@ pub struct Driven {
     pub fits_mps: f64,
     /// Whether heads at their scheduled angles pass unevenly at this speed.
     ///
-    /// Heads apart along the hull are then out of phase.
+    /// Heads at different places along the hull are then out of phase.
     pub is_uneven: bool,
-    /// Whether heads were silent or detected no wall. The speeds are nevertheless those for all heads.
+    /// Whether some heads were silent or detected no wall. The speeds nevertheless assume that all heads
+    /// work.
     pub is_short: bool,
 }
 
-/// Ratio of the time between passes to that of evenly spread passes, above which passes are uneven.
+/// Passes are uneven if the time between them exceeds that of evenly spread passes by this ratio.
 const UNEVEN: f64 = 1.05;
 
 impl Driven {
@@ -121,7 +122,7 @@ impl Driven {
 const MOSTLY_ERROR: f64 = 0.2;
 /// Maximum gap within a stretch, m.
 ///
-/// Within this distance, a vehicle that repeats one section also passes the other.
+/// If a vehicle repeats one section, it also passes the sections within this distance.
 const JOIN_M: f64 = 2.0;
 
 impl Stretch {
@@ -135,7 +136,7 @@ impl Stretch {
         Self { why, from: index, to: index + 1, of }
     }
 
-    /// Number of the stretch's sections that are unsure for this reason.
+    /// Number of the stretch's unsure sections.
     pub fn sections(&self) -> u32 {
         self.of.iter().map(|of| of.sections).sum()
     }

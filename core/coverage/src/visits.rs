@@ -11,9 +11,9 @@ use headrace_fusion::Fix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 
-/// Limits for the age of a sample: below the first, the error between passes applies.
+/// Limits for the age of a sample. Below the first, the error between passes applies.
 ///
-/// Above the second limit, the error relative to a much earlier visit applies.
+/// Above the second, the error relative to a much earlier visit applies.
 const SAME_PASS: DurNs = DurNs(20_000_000_000);
 const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 
@@ -55,7 +55,7 @@ impl Visit {
     }
 }
 
-/// The visits of a section: those with samples within T of it.
+/// The visits of a section: those with samples within the target T of it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Visits {
     /// Number of the newest visit, its stretch of navigation, and the time of its last sample.
@@ -83,9 +83,8 @@ impl Visits {
         self.newest = Some((visit.number, visit.tie, visit.at));
     }
 
-    /// Records the error between the passes of an earlier visit.
-    ///
-    /// The error is the standard deviation of a hole's diameter, m.
+    /// Records the error between the passes of an earlier visit, as the standard deviation of a hole's
+    /// diameter, m.
     pub(super) fn note_earlier(&mut self, sd_m: f64) {
         self.apart_sd_m = self.apart_sd_m.max(sd_m);
     }

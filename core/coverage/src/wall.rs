@@ -26,26 +26,27 @@ pub enum Taken {
     Waits,
 }
 
-/// Decisions that a return brings about.
+/// Decisions that follow from a new return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sorted {
     /// Classification of all waiting returns; `None` if there are none, or if they still wait.
     pub waiting: Option<Taken>,
     /// Classification of this return.
     pub this: Taken,
-    /// Reason if the head becomes distrusted with this return, and the chainages of its recent returns, m.
+    /// Reason if this return makes the head distrusted, and the chainages of the head's recent returns, m.
     pub distrusted: Option<(Distrust, [f64; 2])>,
 }
 
 /// Maximum number of waiting returns.
 pub const MOST_WAITING: usize = 24;
-/// Ratio of distance from the wall to width above which a run is no wall.
+/// A run is no wall if its distance from the wall is more than this multiple of its width, and if it has a
+/// jump to the wall on both sides.
 ///
-/// The run has a jump to the wall on both sides. It hangs in the water, or is an echo off two walls. Rocks, heaps,
-/// niches and caves are about as wide as they are high or deep. Side tunnels appear as deep as they are wide.
+/// Such a run hangs in the water, or is an echo off two walls. Rocks, heaps, niches and caves are about as
+/// wide as they are high or deep. Side tunnels appear as deep as they are wide.
 ///
-/// Tuned on the condition `murk` of the field table: its clusters of returns are at least 12 times as far from the
-/// wall as they are wide.
+/// Tuned on the condition `murk` of the field table: its clusters of returns are at least 12 times as far
+/// from the wall as they are wide.
 const SLENDER: f64 = 4.0;
 
 /// A run of returns, as described above.
@@ -53,7 +54,7 @@ const SLENDER: f64 = 4.0;
 struct Run {
     waiting: [PlacedReturn; MOST_WAITING],
     waits: u8,
-    /// First return of the run, including returns that no longer wait, and number of returns.
+    /// First return and number of returns of the run. Both include returns that no longer wait.
     first: Option<PlacedReturn>,
     all: u32,
     /// Largest distance of the run from the design, and its width, m.
@@ -78,7 +79,7 @@ impl Run {
         let first = *self.first.get_or_insert(*placed);
         self.all += 1;
         self.off_m = self.off_m.max(placed.off_m.abs());
-        // Each return stands for a step, half of it on either side.
+        // Each return represents one step: half a step on either side of it.
         let steps = f64::from(self.all.max(2)) / f64::from(self.all.max(2) - 1);
         self.width_m = self.width_m.max(steps * limits.width_m(&first, placed));
         if let Some(slot) = self.waiting.get_mut(usize::from(self.waits)) {

@@ -1,4 +1,4 @@
-//! Limits on the deviation of returns from the design, and from one another, for returns of one wall.
+//! Limits within which returns count as wall: on their deviation from the design, and from one another.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub struct WallLimits {
     pub perimeter_m: f64,
     /// Radius of a circle with this perimeter.
     pub radius_m: f64,
-    /// Distance along the tunnel within which an earlier pass counts.
+    /// Distance along the tunnel within which returns of an earlier pass count as neighbours.
     ///
     /// The distance doesn't depend on the target T, so the samples don't depend on it either.
     pub reach_m: f64,
@@ -69,7 +69,7 @@ impl WallLimits {
 
 /// Slope between two neighbouring beams that is allowed in addition to the tolerance: 45 degrees.
 const SLOPE: f64 = 1.0;
-/// Maximum allowance for the slope, in tolerances.
+/// Maximum allowance for the wall's slope, as a multiple of the tolerance.
 const MOST_SLOPE: f64 = 1.0;
 /// Maximum distance between neighbours as a share of the radius.
 const NEAR_SHARE: f64 = 0.4;

@@ -22,20 +22,20 @@ use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 
-/// Minimum speed assumed for heads apart along the hull, m/s. It limits the time between their visits of a
-/// place.
+/// Lowest speed, m/s, assumed when the time between the passes of heads at different places along the hull is
+/// computed. At a standstill this time would be infinite.
 const SLOWEST_MPS: f64 = 0.05;
 
 /// Part of the loop that computes the advice.
 pub struct Adviser {
     part: Part<AdviseStage>,
-    /// A tick without packets, which the world has between ticks.
+    /// An empty tick. The world holds it between ticks.
     nothing: Arc<Placed>,
 }
 
 /// Advice of a tick.
 ///
-/// The list is reused from tick to tick. That of [`Advised::default`] grows as needed.
+/// The list is reused from tick to tick. In a default value the list grows as needed.
 #[derive(Debug, Default)]
 pub struct Advised {
     /// Advice at each update, in order.
@@ -44,7 +44,7 @@ pub struct Advised {
 }
 
 impl Advised {
-    /// A tick without updates after this one.
+    /// Returns an empty tick that follows this one.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut stream = self.stream.clone();
         stream.next_tick();
@@ -56,7 +56,7 @@ impl Advised {
 #[derive(Debug, Default, Resource)]
 struct AdviceList(Vec<AdviceEntry>);
 
-/// Stream of the advice.
+/// Result stream of the advice.
 #[derive(Debug, Default, Resource)]
 struct AdviceStream(ResultStream);
 
@@ -82,7 +82,7 @@ pub(super) struct Advisor {
 stateful!(Advisor { state: advisor, looks, hysteresis; fixed: dive_time; });
 
 impl Adviser {
-    /// Creates the adviser. `keeps_results` says whether its stream keeps the words of each tick.
+    /// Creates the adviser. `keeps_results` says whether its stream keeps the contents of each tick.
     ///
     /// Errors: the order of two systems is ambiguous.
     pub(super) fn new(
@@ -104,7 +104,7 @@ impl Adviser {
         Ok(Self { part, nothing: Arc::default() })
     }
 
-    /// Computes the advice of a tick. Every tick must be passed once and in order.
+    /// Computes the advice of a tick. Must be called once for each tick, in order.
     ///
     /// Allocates: never, if the list has room.
     pub fn tick(&mut self, placed: &Arc<Placed>, into: &mut Advised) {
@@ -122,7 +122,7 @@ impl Adviser {
         self.report(into);
     }
 
-    /// Advice before the next tick, with room for any tick. Allocates: all memory of the list.
+    /// Advice before the next tick, with room for a tick of any size. Allocates: all memory of the list.
     pub(super) fn advised_with_room(&self) -> Advised {
         let mut advised = Advised { entries: Vec::with_capacity(MAX_TICK_PACKETS), ..Advised::default() };
         advised.stream.reserve_as(&self.part.world.resource::<AdviceStream>().0);
@@ -186,8 +186,8 @@ impl Advisor {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let was_astern = self.advisor.is_astern();
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
-        // On the way back, heads apart along the hull are in phase at other speeds. Advice from before the
-        // vehicle turned round is no longer valid.
+        // While the vehicle goes back, heads at different places along the hull are in phase at other speeds.
+        // Advice from before the vehicle reversed is no longer valid.
         if self.advisor.is_astern() != was_astern {
             self.hysteresis.forget();
         }
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn every_update_within_a_tick_gets_advice_with_the_time_left() {
+    fn advice_at_each_update_states_the_dive_time_left_at_that_update() {
         let head = HeadSpec {
             mount: mount(),
             step_rad: 0.0157,
@@ -300,7 +300,7 @@ mod tests {
     /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, heads 0.8 m apart
     /// reach the same place 8 s after one another.
     #[test]
-    fn swing_is_measured_between_passes_and_between_heads_along_the_hull() {
+    fn swing_covers_the_time_between_passes_and_between_heads_along_the_hull() {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();
@@ -327,7 +327,7 @@ mod tests {
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }
 
-    /// Other resources and components are constant since arming, or set in each tick.
+    /// All other resources and components are constant after arming, or are set anew in each tick.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let (_, adviser) = armed().split().unwrap();

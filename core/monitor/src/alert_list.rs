@@ -150,7 +150,7 @@ pub struct ListedAlert {
     /// Number of times that the alert was raised. For missed stretches: number of stretches that the alert
     /// represents.
     pub count: u32,
-    /// Number of runs of flagged sections in the alert that aren't cleared yet.
+    /// Number of the alert's runs of flagged sections that aren't cleared yet.
     pub(super) open_runs: u32,
     /// Number of the alert into which this alert was merged.
     pub merged_into: Option<u32>,
@@ -199,13 +199,13 @@ pub struct AlertList {
     raised: u32,
     /// Number of cleared alerts no longer kept.
     dropped: u64,
-    /// Number of each run's alert, or zero, by run of flagged sections.
+    /// For each run of flagged sections: number of its alert, or zero.
     by_run: Vec<u32>,
     /// Timers, by situation.
     timers: Vec<Timer>,
     /// Time of the first update.
     begun: Option<MonoNs>,
-    /// Data and positions seen so far.
+    /// Record of the data and positions that have arrived so far.
     had: conditions::Had,
     /// Largest speed advised at the last update, m/s; zero if none.
     v_max_mps: f64,

@@ -1,5 +1,5 @@
-//! The alerter: combines the values of the other parts and the operator's commands to the live state, alerts
-//! and notes.
+//! The alerter: combines the values of the other parts and the operator's commands into the live state,
+//! alerts and notes.
 
 use super::adviser::Advised;
 use super::alert_list::{AlertList, Beat, MOST_LISTED, RunInput, Telling};
@@ -19,9 +19,9 @@ use headrace_sampling::head::HeadSet;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Maximum share of the target for position errors for which the advice allows.
+/// Largest share of the target that position errors may take. Above it, the position is doubtful.
 const SPREAD_SHARE: f64 = 0.2;
-/// Notices per update: each alert may change several times.
+/// Room for notices, per alert in the list. An alert may change several times in a tick.
 const NOTICES_PER_ALERT: usize = 4;
 
 /// Alerts, notes and the live state.
@@ -42,7 +42,7 @@ pub struct Alerter {
 }
 
 impl Alerter {
-    /// Creates the alerter. `keeps_results` says whether its streams keep the words of each tick.
+    /// Creates the alerter. `keeps_results` says whether its streams keep the contents of each tick.
     ///
     /// `runs` is the maximum number of runs that change in a tick. Allocates: all memory.
     pub(super) fn new(
@@ -76,7 +76,7 @@ impl Alerter {
         self.changes.next_tick();
     }
 
-    /// Takes what the other parts have made of a tick, which ends at `now`. Allocates: never.
+    /// Applies the results of the other parts for a tick that ends at `now`. Allocates: never.
     pub(super) fn tick(&mut self, placed: &Placed, found: &Found, advised: &Advised, now: MonoNs) {
         self.notices.clear();
         let (runs, commands) = (&found.runs[..], &placed.commands.0[..]);
@@ -93,7 +93,7 @@ impl Alerter {
         self.state.now = now;
     }
 
-    /// Takes the runs that a judgement at the end of a dive has changed.
+    /// Applies the changes of runs that were judged at the end of a dive.
     pub(super) fn take_runs_at_end(&mut self, runs: &[RunInput]) {
         self.notices.clear();
         for run in runs {
@@ -101,7 +101,7 @@ impl Alerter {
         }
     }
 
-    /// Takes the observations after the last judgement of a dive.
+    /// Applies the observations after the last judgement of a dive.
     pub(super) fn take_observations_at_end(&mut self, observations: &Observations, at: MonoNs) {
         self.notices.clear();
         let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };

@@ -131,7 +131,7 @@ impl SensorHealth {
     }
 }
 
-/// The span of time extended to `at`.
+/// The time span, extended to include `at`.
 pub(super) fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, MonoNs) {
     span.map_or((at, at), |(first, last)| (first.min(at), last.max(at)))
 }
@@ -147,7 +147,8 @@ pub struct HeadSpecification {
     pub spec: HeadSpec,
     /// Modes to which the head can be set.
     pub modes: Vec<HeadMode>,
-    /// Shortest range setting that reaches all wall from the centre, m, and the head's modes at that setting.
+    /// Shortest range setting that reaches all wall from the tunnel's centre, m, and the head's modes at that
+    /// setting.
     ///
     /// The setting is the head's own or a longer one. `None` if no setting is long enough.
     pub reaching: Option<(f64, Vec<HeadMode>)>,
@@ -219,7 +220,8 @@ pub(super) struct LastSample {
     pub(super) unbroken: bool,
 }
 
-/// Reach of a head; `None` before its first ping with a fix.
+/// Reach of a head: where its samples land now, and have landed so far; `None` before its first ping with a
+/// fix.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct HeadFrontier(pub Option<HeadReach>);
 

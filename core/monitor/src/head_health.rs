@@ -14,9 +14,8 @@ const ELSEWHERE_RAD: f64 = TAU / 2.0;
 /// design varies by this much, m.
 const STUCK_RAD: f64 = TAU / 2.0;
 const STUCK_M: f64 = 0.3;
-/// Share of returns off the design above which a head is deaf, and limit for the share of another head.
-///
-/// The first limit applies only if another head's share is below the second.
+/// A head is deaf if more than the first share of its returns are off the design, while less than the second
+/// share of another head's returns are.
 const ELSEWHERE: [f64; 2] = [0.85, 0.5];
 
 /// Health of a head; part of the loop's state.
@@ -26,7 +25,7 @@ pub struct HeadHealth {
     last_rad: f64,
     /// Angle turned since the last return, radians.
     unheard_rad: f64,
-    /// Angle turned with returns, radians; at most a turn.
+    /// Angle turned while returns came, radians; at most a turn.
     heard_rad: f64,
     /// Share of the latest returns that are off the design.
     elsewhere: f64,

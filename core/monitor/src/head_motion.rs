@@ -12,13 +12,13 @@ const SAME_ANGLE_RAD: f64 = 1e-6;
 /// Minimum angle over which the turn rate is measured, radians. Until the head has turned that far, the whole
 /// angle so far is used.
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
-/// Multiple of the usual step above which a step counts as several: pings were skipped.
+/// Multiple of the usual step. A longer step counts as several steps, because pings were skipped.
 const LONG_STEP: f64 = 1.5;
 
-/// Multiples of the usual step, and of the angle expected at the turn rate, beyond which a head has restarted
-/// elsewhere.
+/// Multiples of the usual step, and of the angle expected at the turn rate. A head whose step exceeds both
+/// has restarted elsewhere.
 ///
-/// A head that has fallen behind its programmed angle takes steps of at most eight times its own.
+/// A head that lags behind its programmed angle catches up in steps of at most eight times the usual step.
 const ELSEWHERE_STEPS: f64 = 10.0;
 const ELSEWHERE_RATES: f64 = 4.0;
 
@@ -48,7 +48,7 @@ pub struct MeasuredMotion {
     sector_rad: Option<f64>,
     /// Whether the present sweep began at a turning point.
     from_turning_point: bool,
-    /// Total unsigned angle turned through, radians, and the two points from which the rate is measured.
+    /// Total unsigned angle turned through, radians. The rate is measured between two points, `anchors`.
     turned_rad: f64,
     anchors: [Option<(MonoNs, f64)>; 2],
     step_rad: Option<f64>,
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn head_in_a_sector_reverses_at_its_ends() {
+    fn head_that_sweeps_a_sector_reverses_at_the_sector_ends() {
         let (track, turned) = run((0..500).map(|k| {
             let phase = f64::from(k % 200);
             if phase <= 100.0 { phase * 0.9 } else { (200.0 - phase) * 0.9 }

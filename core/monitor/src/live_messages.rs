@@ -43,7 +43,7 @@ pub enum LiveMessage {
         #[serde(skip)]
         missed: Missed,
     },
-    /// End of the last flagged run is known.
+    /// The end of the last flagged run is known.
     FlagEnds {
         /// Number of the run.
         run: u32,
@@ -54,7 +54,7 @@ pub enum LiveMessage {
         /// Metres of the run that fail.
         failed_m: f64,
     },
-    /// A missed stretch was passed again, and none of its sections fails any more.
+    /// The vehicle has driven through a missed stretch again, and none of its sections fails any more.
     Cleared {
         /// Number of the run that was flagged.
         run: u32,
@@ -65,9 +65,9 @@ pub enum LiveMessage {
     },
     /// A stretch without a verdict has begun.
     CannotSay(UnsureStretch),
-    /// End of a stretch without a verdict is known.
+    /// The end of a stretch without a verdict is known.
     CannotSayEnds(UnsureStretch),
-    /// Not all heads have passed the place where the vehicle began or turned back, and the vehicle is now
+    /// Some heads have not been at the place where the vehicle began or turned back, and the vehicle is now
     /// well away from it.
     NotInspected(UnsureStretch),
     /// An alert has changed.
@@ -92,7 +92,7 @@ pub enum LiveMessage {
 
 /// Converts the loop's notices to live messages.
 ///
-/// A dive has one of these, and all its readers share the messages.
+/// A dive has one converter. All readers share its messages.
 #[derive(Debug, Default)]
 pub struct LiveMessages {
     /// Last flagged run with its reported causes, until its end is reported.
@@ -114,7 +114,7 @@ pub struct LiveMessages {
     played: Option<MonoNs>,
 }
 
-/// Sections reported as missed: from the first one that ever failed to the one after the last.
+/// Sections reported as missed: index of the first one that ever failed, and index after the last one.
 #[derive(Debug, Clone, Copy)]
 struct ReportedMiss {
     run: RunId,
@@ -129,7 +129,8 @@ impl ReportedMiss {
 }
 
 impl LiveMessages {
-    /// Resets all state if the playback has stopped at another time than that of the last tick, after a jump.
+    /// Resets all state after a jump of the playback: it has stopped at another time than that of the last
+    /// tick.
     ///
     /// After a mere pause, the messages continue.
     pub fn stopped(&mut self, now: MonoNs) {
@@ -188,7 +189,8 @@ impl LiveMessages {
         self.close_unsure(sections, tell);
     }
 
-    /// Reports that another setting is doubtful than before. The alert goes on, so that there is no notice.
+    /// Reports that the doubtful setting has changed to another one. The alert stays active, so no notice
+    /// reports this change.
     fn tell_other_setting(&mut self, at: MonoNs, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let doubted = dive.view().alert_list().iter().rev().find_map(|alert| match alert.figures {
             Figures::Setting(doubt, _) if alert.state == AlertState::Active => Some((alert, doubt)),
@@ -326,7 +328,8 @@ impl LiveMessages {
         self.missed.push(whole);
     }
 
-    /// Reports the end of a missed stretch as it was reported, and then its parts without a verdict.
+    /// Reports that a missed stretch is cleared, with the bounds reported before. Then reports its parts
+    /// without a verdict.
     fn clear(&mut self, run: &Run, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(at) = self.missed.iter().position(|told| told.meets(run)) else { return };
         let Some(told) = self.missed.get(at).copied() else { return };
@@ -375,7 +378,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     let Some(mut now) = each.next() else { return *told };
     (now.from, now.to) = (told.from, told.to);
     for here in each {
-        // All sections are within these bounds.
+        // The bounds include all sections, so the join succeeds.
         if !now.join(&here, sections.section_m()) {
             break;
         }

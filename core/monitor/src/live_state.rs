@@ -94,7 +94,7 @@ pub struct LiveMetres {
     pub cannot_say_m: f64,
     /// Metres that further driving may still fill.
     pub open_m: f64,
-    /// Metres that not all heads have passed, where the vehicle began or turned back.
+    /// Metres where some heads have not been, because the vehicle began or turned back there.
     pub not_inspected_m: f64,
 }
 
@@ -190,8 +190,8 @@ pub struct LiveState {
     pub metres: LiveMetres,
     /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
-    /// Whether all wall that the heads see here has passed. The vehicle's chainage and the verdicts decide
-    /// this.
+    /// Whether all wall that the heads see here has the verdict pass. The vehicle's chainage and the verdicts
+    /// decide this.
     pub passed: bool,
     /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
     pub back_to_m: Option<f64>,
@@ -248,7 +248,7 @@ impl LiveState {
         }
     }
 
-    /// End of the tunnel beyond which all heads are, m; `None` if a head may be inside.
+    /// Chainage of the tunnel's end beyond which all heads are, m; `None` if a head may be inside.
     pub fn outside_m(&self) -> Option<f64> {
         let x_m = self.chainage_m?;
         let beyond = x_m > self.length_m + self.heads_reach_m;
@@ -317,7 +317,7 @@ impl LiveState {
         Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps >= LEAST_MPS)
     }
 
-    /// Share of lost returns; `None` unless compensating for the losses costs at least a fifth of the speed.
+    /// Share of lost returns; `None` unless they reduce the largest speed by at least a fifth.
     pub fn lost_share(&self) -> Option<f64> {
         /// Share of the speed that remains if losses cost a fifth of it.
         const LEFT: f64 = 0.8;

@@ -42,8 +42,8 @@ impl PilotLine {
         text
     }
 
-    /// The line broken to at most `columns`. Continuation lines are indented to where the text of the first
-    /// line begins.
+    /// The line, broken into lines of at most `columns` characters. Continuation lines are indented to where
+    /// the text of the first line begins.
     pub fn broken(&self, columns: usize) -> Vec<String> {
         let whole = self.text();
         if whole.chars().count() <= columns {
@@ -154,7 +154,7 @@ pub fn status_line(
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
 }
 
-/// Condition with its explanation. `v_max` is v_max with its unit.
+/// Text of a condition with its explanation. `v_max` is the text of v_max with its unit.
 fn condition_text(
     condition: Condition,
     state: &LiveState,
@@ -186,7 +186,7 @@ fn condition_text(
     }
 }
 
-/// Number of decimals with which the present speed and the limit read differently.
+/// Number of decimals needed to tell the present speed from the limit.
 ///
 /// A speed that reads like the limit would not seem too fast.
 fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
@@ -225,7 +225,7 @@ fn losses_text(state: &LiveState) -> Option<String> {
     state.lost_share().map(|share| format!("{:.0} % of returns lost", 100.0 * share))
 }
 
-/// Forecast T of the present turn, and the target.
+/// Text of the spacing T forecast for the present turn, and of the target.
 fn forecast_text(state: &LiveState) -> Option<String> {
     let advice = state.advice.as_ref().filter(|_| state.v_max_mps().is_some())?;
     Some(match advice.predicted_t_m {
@@ -331,7 +331,7 @@ fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
 impl LiveMessage {
     /// Whether the message's line adds something to the status and the other lines.
     ///
-    /// Of the changes of alerts, these add something: acknowledgements, remaining resources, doubts about
+    /// Among changes of alerts, these add something: acknowledgements, remaining resources, doubts about
     /// sensors, settings and the dive as a whole, and ends that no other line shows.
     pub fn adds_line(&self) -> bool {
         let Self::AlertChange { change, alert } = self else { return true };

@@ -14,8 +14,8 @@ const WORDS: usize = BINS / 64;
 const WINDOW: u32 = 4096;
 /// Minimum number of pings for a share. With fewer, a single loss would count too much.
 const LEAST: u32 = 100;
-/// Weight of the overall share of losses in the share of losses after a lost ping, in pings. It matters while
-/// lost pings are few.
+/// Weight of the overall loss share, in pings, in the estimate of the loss share after a lost ping. It
+/// matters while few pings are lost.
 const USUAL: f64 = 50.0;
 /// Share of lost pings above which a head is nearly deaf. Hardly any angle then gives a return in two
 /// successive turns.
@@ -63,13 +63,13 @@ impl Angles {
 ///
 /// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side
 /// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such returns are not lost by
-/// chance, neither the first nor the last of them.
+/// chance, and none of them is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
     /// Whether the wall was detected at each angle in the last turn, and in the turn before that.
     heard: Angles,
     heard_before: Angles,
-    /// Whether the ping before the last one at each angle was lost.
+    /// For each angle: whether the ping just before the last ping at that angle was lost.
     followed_lost: Angles,
     /// Counts of all pings at wall within range, of the counted pings, and of the counted pings that followed
     /// a lost ping.
@@ -91,7 +91,7 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The ping a turn ago is counted: the wall was detected before and after it.
+            // The ping a turn ago is counted, because the wall was detected before and after it.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {
@@ -201,19 +201,19 @@ mod tests {
             }
             count.at_most()
         };
-        // 280 of the 400 pings of a turn are detected. An angle counts from its third detection on.
+        // In each turn, 280 of the 400 pings detect the wall. An angle counts from its third detection on.
         let early = at_most(0..1000);
         assert!(early.share > 0.3 && early.after_lost >= 1.0, "{early:?}");
         assert_eq!(at_most(1000..1100), LossRate::default());
     }
 
     #[test]
-    fn wall_without_returns_in_successive_turns_is_no_random_loss() {
+    fn losses_at_one_angle_in_successive_turns_are_not_random() {
         let grazing = turned(8000, |ping| ping % 400 < 120);
         assert!(grazing.share <= 0.0, "{grazing:?}");
         let both = turned(8000, |ping| ping % 400 < 120 || chance(ping, 5));
         assert!((both.share - 0.05).abs() < 0.02, "{both:?}");
-        // Side tunnels, each passed for three turns.
+        // Side tunnels, each in view for three turns.
         let tunnels = turned(24_000, |ping| ping / 400 % 6 > 2 && ping % 400 < 60);
         assert!(tunnels.share <= 0.0, "{tunnels:?}");
     }

@@ -29,7 +29,7 @@ struct Received {
 }
 
 impl Inbox {
-    /// An inbox with room for any tick. Allocates: all memory of the lists.
+    /// An inbox with room for a tick of any size. Allocates: all memory of the lists.
     pub(super) fn with_room() -> Self {
         Self {
             packets: Vec::with_capacity(MAX_TICK_PACKETS),

@@ -61,7 +61,7 @@ pub enum Outcome {
     Unplaced(NoFix),
 }
 
-/// Whether the vehicle occludes a beam, by the geometry of the vehicle.
+/// Whether the vehicle occludes a beam, according to the vehicle's geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Hidden {
     /// Not occluded.
@@ -139,7 +139,7 @@ pub enum Placement {
     Update(Update),
 }
 
-/// A placement and its place among the tick's readings.
+/// A placement and its position among the tick's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedItem {
     /// Index of the ping's reading. For an update: index of the first reading after it.
@@ -155,7 +155,7 @@ pub struct Standing {
     pub metres: LiveMetres,
     /// Last judged unsure stretch.
     pub unsure: Option<Stretch>,
-    /// Whether all wall that the heads see here has passed.
+    /// Whether all wall that the heads see here has the verdict pass.
     pub passed: bool,
     /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
     pub back_to_m: Option<f64>,

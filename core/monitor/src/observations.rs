@@ -18,13 +18,13 @@ pub(crate) enum ObservedKind {
     OutsideTunnel,
     /// Most samples of a section deviate from the design profile by more than the contradiction limit.
     ProfileContradicted,
-    /// Successive returns of a head disagree: they are noise.
+    /// Successive returns of a head disagree, so they are noise.
     HeadScattered,
     /// A head's range stays constant although it must change at the vehicle's place.
     HeadConstant,
     /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
-    /// The cable counter differs from the inertial unit or from a velocity log: one of them is wrong.
+    /// The cable counter differs from the inertial unit or from a velocity log, so one of them is wrong.
     CableDoubted,
     /// Ranges contradict a setting of the vehicle file.
     SettingDoubted,
@@ -64,7 +64,7 @@ pub struct Occurrences {
     /// Number of occurrences.
     ///
     /// An occurrence is a sample outside the tunnel, a judgement of a contradicting section, the beginning of
-    /// distrust in a head or the cable counter, or another doubtful setting.
+    /// distrust in a head or the cable counter, or a change of the doubtful setting.
     pub count: u64,
     /// Chainage of the first occurrence, m.
     pub first_m: f64,
@@ -126,7 +126,7 @@ impl Observations {
     /// Records a lasting occurrence that began at `since`. Later calls for the same occurrence don't count
     /// again.
     ///
-    /// Returns true when the first occurrence is first recorded.
+    /// Returns true only when the first occurrence is recorded.
     pub(crate) fn note_lasting(
         &mut self,
         source: Option<SourceId>,
@@ -146,7 +146,7 @@ impl Observations {
 
     /// Records a doubtful setting, found at a chainage, m.
     ///
-    /// If another setting becomes the likeliest, counts an occurrence and returns true.
+    /// If another setting becomes the one that is most likely wrong, counts an occurrence and returns true.
     pub(crate) fn note_setting(&mut self, at: MonoNs, x_m: f64, doubt: &SettingDoubt) -> bool {
         let kind = ObservedKind::SettingDoubted;
         let known = self.get_mut(kind, None).and_then(|known| known.setting);

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn mode_with_the_fastest_speed_is_chosen_with_its_turn_period() {
+    fn turn_period_is_that_of_the_mode_with_the_fastest_speed() {
         // At 6 m from the wall, 0.9 degrees are 0.094 m, and 0.6 degrees are 0.063 m.
         let at = |target_m: f64| of_head(&head(2.4, None), 6.0, target_m);
         let roomy = at(0.2);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn longer_range_has_the_turn_period_of_its_mode() {
+    fn longer_range_uses_the_turn_period_of_the_mode_at_that_range() {
         let far = vec![mode("fast", 0.9, 10.0), mode("fastest", 2.4, 6.0)];
         assert!((of_head(&head(2.4, Some((12.0, far.clone()))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
         assert!((of_head(&head(0.9, Some((12.0, far))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);

@@ -20,7 +20,7 @@ pub struct OtherTargetReport {
     pub cannot_say_m: f64,
     /// Metres that would still be open.
     pub open_m: f64,
-    /// Metres that not all heads would have passed.
+    /// Metres where some heads would not have been.
     pub not_inspected_m: f64,
 }
 

@@ -77,7 +77,7 @@ impl<S: Stage> Part<S> {
         });
     }
 
-    /// Makes a component of the entities state.
+    /// Registers a component of the entities as state, which snapshots contain.
     pub(super) fn add_component_state<T: Component<Mutability = Mutable> + Stateful>(
         &mut self,
         name: &'static str,
@@ -141,7 +141,7 @@ impl<S: Stage> Part<S> {
     /// Runs the systems of a stage.
     pub(super) fn run(&mut self, stage: S) {
         let Self { world, stages, .. } = self;
-        // An empty schedule takes time, too.
+        // Empty schedules are skipped, because running them takes time, too.
         if let Some(systems) = stages.iter_mut().find(|other| other.stage == stage && !other.is_empty) {
             systems.schedule.run(world);
         }
@@ -157,7 +157,7 @@ impl<S: Stage> Part<S> {
 
     /// Restores the state.
     ///
-    /// Errors: the snapshot is of another vehicle or version.
+    /// Errors: the snapshot comes from another vehicle or version.
     pub(super) fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
         let Self { world, entities, state, .. } = self;
         state.iter().try_for_each(|state| {
@@ -169,9 +169,10 @@ impl<S: Stage> Part<S> {
 
 #[cfg(test)]
 impl<S: Stage> Part<S> {
-    /// Panics unless resources and components of the entities are either state or among the given types.
+    /// Panics unless each resource and each component of the entities is either state or among the given
+    /// types.
     ///
-    /// The given types must be constant since arming, or set in each tick.
+    /// The given types must be constant after arming, or set anew in each tick.
     pub(super) fn has_state_but_for(&self, others: &[TypeId]) {
         let mut bare = World::new();
         schedule().run(&mut bare);
@@ -191,7 +192,7 @@ impl<S: Stage> Part<S> {
     }
 }
 
-/// Empty schedule: single-threaded, with an ambiguous order of systems as an error.
+/// Empty, single-threaded schedule that reports an ambiguous order of systems as an error.
 fn schedule() -> Schedule {
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());

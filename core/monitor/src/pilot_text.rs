@@ -156,8 +156,8 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadDescriptions
 /// Text of the actions for a missed stretch, as in [`action_text`]. If there are several actions, the first
 /// two are named.
 ///
-/// An action that is needed before the vehicle goes back comes first. The action "slower" is given by the
-/// speed.
+/// An action that is needed before the vehicle goes back comes first. The action "slower" is expressed by the
+/// stated speed.
 pub fn actions_text(
     actions: &[Action],
     back_to_m: f64,
@@ -203,7 +203,7 @@ fn short_text(action: Action, heads: &HeadDescriptions) -> String {
 pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &HeadDescriptions) -> String {
     let back = format!("go back to {}", station(back_to_m));
     let text = match action {
-        // No speed is stated: it would apply to the present mode and range setting only.
+        // No speed is stated, because it would apply to the present mode and range setting only.
         Action::FinerMode => return format!("slower won't help: {}, then {back}", heads.set_finer()),
         Action::LongerRange => return format!("set {}, then {back}", heads.longer_range()),
         // A speed is stated because it helps in other parts of the stretch.
@@ -213,7 +213,8 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         Action::Slower => back,
         Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
-        // The exact speed is stated: below it, heads apart along the hull are out of phase again.
+        // The exact speed is stated, because below it heads at different places along the hull are out of
+        // phase again.
         Action::InPhase if at_most_mps > 0.0 => {
             return format!("{back}, then with the heads in phase, at {at_most_mps:.2} m/s");
         }
@@ -302,7 +303,7 @@ pub fn flag_text(missed: &Missed, profile: &Profile, heads: &HeadDescriptions) -
     )
 }
 
-/// Text for a stretch that was passed again and is no longer flagged.
+/// Text for a stretch that the vehicle has driven through again and that is no longer flagged.
 pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }

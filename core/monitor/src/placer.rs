@@ -44,7 +44,7 @@ pub struct Placer {
 
 /// Results of the placer for a tick. The other parts read nothing else of it.
 ///
-/// The lists are reused from tick to tick. Those of [`Placed::default`] grow as needed.
+/// The lists are reused from tick to tick. In a default value they grow as needed.
 #[derive(Debug, Default)]
 pub struct Placed {
     /// Packets, in the order of consumption.
@@ -93,7 +93,7 @@ impl Placed {
         spans.reduce(|(first, last), (from, to)| (first.min(from), last.max(to)))
     }
 
-    /// A tick without packets after this one.
+    /// Returns an empty tick that follows this one.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut poses = self.poses.clone();
         poses.next_tick();
@@ -128,7 +128,7 @@ impl Placer {
             poses.0.keep();
         }
         part.insert_state("poses", poses);
-        // Placed has these lists during a tick.
+        // During a tick, these are swapped with the lists of `Placed`.
         part.insert_resource(Inbox::default());
         part.insert_resource(Events::default());
         part.insert_resource(PlacedList::default());
@@ -176,7 +176,7 @@ impl Placer {
         debug_assert!(into.commands.0.is_sorted_by_key(|command| command.before), "commands are in order");
     }
 
-    /// Results before the next tick, with room for any tick. Allocates: all memory of the lists.
+    /// Results before the next tick, with room for a tick of any size. Allocates: all memory of the lists.
     pub(super) fn placed_with_room(&self) -> Placed {
         let mut placed = Placed {
             inbox: Inbox::with_room(),
@@ -281,7 +281,7 @@ mod tests {
     use crate::fixtures::armed;
     use crate::resources::{Target, TunnelDesign};
 
-    /// Other resources and components are constant since arming, or set in each tick.
+    /// All other resources and components are constant after arming, or are set anew in each tick.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let (placer, _) = armed().split().unwrap();

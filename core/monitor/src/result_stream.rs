@@ -233,8 +233,8 @@ impl RecordKind {
             Self::Note => &NOTE,
             Self::Voice => &VOICE,
         };
-        // Words beyond the last field repeat. Advice has the speeds that other modes allow. The live state
-        // has each source's last reading. A note has its text.
+        // All words beyond the last field have the same name and type. In advice they are the speeds that
+        // other modes allow, in the live state each source's last reading, and in a note its text.
         let beyond = match self {
             Self::Advice => ("alternative_v_max_mps", Number),
             Self::State => ("heard_ns", Integer),
@@ -418,7 +418,7 @@ mod tests {
         }
     }
 
-    /// The digest depends neither on whether words are kept, nor on whether there is room for them.
+    /// The digest is the same whether words are kept or not, and whether there is room for them or not.
     #[test]
     fn digest_does_not_depend_on_whether_records_are_stored() {
         let mut plain = ResultStream::default();

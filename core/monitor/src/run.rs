@@ -156,7 +156,7 @@ impl Loop {
     /// previous tick.
     ///
     /// Returns false if a lagging outlet holds back the tick's packets. The call then counts as a tick
-    /// without packets. Pass the same tick again a little later.
+    /// without packets. Call again with the same tick a little later.
     pub fn tick_placed(&mut self, now: MonoNs, placed: &Arc<Placed>, advised: &mut Advised) -> bool {
         let is_taken = placed.inbox.byte_len() <= self.allowance_bytes;
         if is_taken {
@@ -308,7 +308,7 @@ impl Loop {
     /// A loop of the same vehicle gives the same results after it has restored the snapshot. The snapshot
     /// excludes packets waiting in the rings, and private state of plugins.
     ///
-    /// Errors: a part is split off or can't be serialised.
+    /// Errors: placer and adviser are split off, or a value can't be serialised.
     pub fn save(&self) -> Result<Vec<u8>, SnapshotError> {
         let Some((placer, adviser)) = &self.ahead else {
             let (part, why) =
@@ -372,7 +372,10 @@ impl Loop {
     }
 }
 
-/// The value behind an `Arc`, which no other reader has between ticks unless the loop was split.
+/// Returns exclusive access to the value behind an `Arc`.
+///
+/// Between ticks no other reader holds the value, unless the loop was split. In that case, a new value
+/// replaces it.
 fn sole<'a>(placed: &'a mut Arc<Placed>, placer: &Placer) -> &'a mut Placed {
     if Arc::get_mut(placed).is_none() {
         *placed = Arc::new(placer.placed_with_room());

@@ -56,7 +56,7 @@ pub struct SectionRow {
     pub settled: bool,
     /// Whether the section is open although further driving won't change it.
     ///
-    /// The vehicle began or turned back there, so not all heads have passed the section.
+    /// The vehicle began or turned back there, so some heads have not been in the section.
     pub not_inspected: bool,
     /// Reason for `cannot_say`, or `NotInspected`, which the report leaves to `not_inspected`.
     #[serde(serialize_with = "reason_word")]
@@ -69,7 +69,7 @@ pub struct SectionRow {
     pub cleared_s: Option<f64>,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful_returns: u32,
-    /// Whether the section has samples of a head that was distrusted soon afterwards. Such a section can't
+    /// Whether the section has samples of a head that became distrusted soon afterwards. Such a section can't
     /// pass.
     pub suspect: bool,
 }

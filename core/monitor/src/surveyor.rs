@@ -43,7 +43,7 @@ use survey::{Cursor, Requests};
 /// Part of the loop from placed pings to verdicts.
 pub struct Surveyor {
     part: Part<SurveyStage>,
-    /// A tick without packets, which the world has between ticks.
+    /// An empty tick. The world holds it between ticks.
     nothing: Arc<Placed>,
 }
 
@@ -198,7 +198,7 @@ mod tests {
     use crate::fixtures::armed;
     use crate::resources::{Target, TunnelDesign};
 
-    /// Other resources and components are constant since arming, or set in each tick.
+    /// All other resources and components are constant after arming, or are set anew in each tick.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let dive = armed();

@@ -69,7 +69,8 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
     }
 }
 
-/// Ratios to the fitting speed. A speed between them counts as equal to the fitting speed.
+/// Ratios of a speed to the fitting speed, which is the largest one that meets the target. Between the two
+/// ratios, the speed counts as equal to the fitting speed.
 const AS_FITS: [f64; 2] = [0.98, 1.02];
 
 /// Text of the remedy; empty if there is none.
@@ -87,7 +88,7 @@ pub fn helps_text(stretch: &UnsureStretch) -> String {
             } else if fits_mps > 0.0 && speed_mps > most_mps {
                 format!("at most {fits_mps:.2} m/s, or {surer}")
             } else if speed_mps > 0.0 && speed_mps < least_mps && is_uneven {
-                // Below this speed, heads apart along the hull are out of phase.
+                // Below this speed, heads at different places along the hull are out of phase.
                 format!("at {fits_mps:.2} m/s, or {surer}")
             } else {
                 surer.to_owned()

@@ -1,4 +1,5 @@
-//! The view: what outsiders read of a tick. It borrows the values of the parts and computes nothing.
+//! The view: everything that outlets and plugins can read of a tick. It borrows the values of the parts and
+//! computes nothing.
 
 use super::adviser::Advised;
 use super::alert_list::{AlertList, TextContext};
@@ -20,7 +21,7 @@ use super::surveyor::Surveyor;
 use headrace_geometry::time::MonoNs;
 use headrace_vehicle::Mission;
 
-/// Mission and sensors of a loop; constant since arming.
+/// Mission and sensors of a loop; constant after arming.
 #[derive(Debug)]
 pub struct About {
     /// Tunnel and target.

@@ -15,7 +15,7 @@ use headrace_sampling::advice::Reason;
 pub const STARTING: &str = "STARTING";
 /// Action for finding the gyros' bias. The number of seconds follows.
 pub const STAND_STILL: &str = "stand still";
-/// State of a section that not all heads have passed.
+/// State of a section where some heads have not been.
 pub const NOT_INSPECTED: &str = "not inspected";
 /// State of wall without any data.
 pub const UNSEEN: &str = "unseen";
@@ -59,8 +59,8 @@ pub fn condition_words(condition: Condition) -> ConditionWords {
         Condition::GoingBack(_) => ["going back", "to a missed section: any speed will do", "", ""],
         Condition::NoSpeed => ["slower won't help", "no speed meets the target here", "", ""],
         Condition::TooFast => ["TOO FAST", "", "", "at most"],
-        // Heads that are apart along the hull and turn out of phase can miss wall below v_max. Going slower
-        // would then make it worse, so the action is v_max itself.
+        // Below v_max, heads at different places along the hull can be out of phase and miss wall. Going
+        // slower would then make it worse, so the action is v_max itself.
         Condition::TurnFails => ["THIS TURN MISSES", "", "", "go"],
         Condition::CannotSay(doubt) => ["CAN'T SAY", doubt_words(doubt), "", "at most"],
         Condition::Over => ["a little fast", "", "", "at most"],

@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn value_out_of_range_names_line_key_value_and_range() {
+    fn error_for_a_value_out_of_range_names_line_key_value_and_range() {
         let why = parsed("[advice]\nring_deg = 0.05\n").unwrap_err().to_string();
         assert!(
             why.contains("vehicle.toml:2: advice.ring_deg = 0.05: must be a number from 0.1 to 1"),

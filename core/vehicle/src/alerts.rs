@@ -41,9 +41,9 @@ impl AlertClass {
 /// Delays before an alert becomes active and before it clears.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClassTiming {
-    /// Duration of the situation before the alert becomes active.
+    /// Time for which the situation must last before the alert becomes active.
     pub hold: DurNs,
-    /// Duration without the situation before the alert clears.
+    /// Time for which the situation must be absent before the alert clears.
     pub off: DurNs,
 }
 

@@ -47,15 +47,16 @@ const MAX_PLACES: i64 = 1_000_000;
 impl CoverageConfig {
     /// Returns the default deviation above which a sample contradicts a profile of this perimeter, m.
     ///
-    /// The value is larger than a lining, or the error of a design that is 6 % off. It is smaller than the deviation
-    /// of another tunnel.
+    /// The value exceeds the thickness of a lining, and the error of a design that is 6 % off. It is smaller
+    /// than the deviation of another tunnel.
     pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
     /// Reads both tables from the root of a vehicle file.
     ///
-    /// `profile` or `target_m` is `None` if it is wrong in the file; the tables are then checked as far as possible.
+    /// `profile` or `target_m` is `None` if its keys in the file are invalid. The tables are then checked as
+    /// far as possible.
     ///
     /// Errors: a key that is missing, unknown or out of range.
     pub(super) fn of_root(

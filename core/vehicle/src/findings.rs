@@ -1,6 +1,7 @@
 //! Checks of a vehicle file as a whole, after its keys have been read.
 //!
-//! The checks find connections that cannot be shared, walls outside the heads' range limits, and heads out of step.
+//! The checks find connections that cannot be shared, wall outside the heads' range limits, and heads whose
+//! passes cannot interleave.
 
 use core::fmt;
 
@@ -47,7 +48,7 @@ const BEAMS: u32 = 720;
 ///
 /// If the share is lower, the range setting or the tunnel is wrong.
 const LEAST_SHARE: f64 = 0.5;
-/// Relative difference of turn durations below which heads stay in step for hours.
+/// Relative difference of turn periods below which heads stay in phase for hours.
 const SAME_TURN: f64 = 1e-6;
 /// Finest range step of a sonar, m: that of an 881L set to 5 m or less (Imagenex 881L data sheet).
 ///
@@ -76,7 +77,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Returns the sensors that cannot share the connection of an earlier sensor, each with the reason.
+    /// Returns the sensors that cannot share the connection of an earlier sensor, each with the reason why.
     pub fn excluded_from_lines(&self) -> Vec<(usize, String)> {
         let mut found = Vec::new();
         let mut before: Vec<(usize, Connect)> = Vec::new();
@@ -115,7 +116,7 @@ impl VehicleConfig {
                 }
             }
         }
-        // A vehicle without any connection is only simulated or replayed.
+        // If no sensor has a connection, the vehicle is only simulated or replayed, which needs none.
         if silent.len() < self.sensors.len() {
             let problem = format!("have no connect, so `run` can't reach them: {}", silent.join(", "));
             found.extend((!silent.is_empty()).then(|| warning("sensors".to_owned(), problem)));
@@ -324,7 +325,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn connections_to_one_end_are_recognised_in_any_notation() {
+    fn connections_to_the_same_end_are_recognised_in_every_notation() {
         let parse = |text: &str| Connect::parse(text).unwrap();
         for (a, b, expected) in [
             ("serial:/dev/a?baud=9600", "serial:/dev/a", Some("serial port")),

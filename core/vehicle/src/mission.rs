@@ -29,7 +29,7 @@ pub struct Mission {
     pub layout: HeadLayout,
     /// Speed for which the heads' phases are planned, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
-    /// Parts of the vehicle that may occlude a head, other than the other heads.
+    /// Parts of the vehicle, apart from the heads, that may occlude a head.
     pub hull: Vec<Obstacle>,
     /// Verdict parameters and openings of the wall.
     pub coverage: CoverageConfig,
@@ -76,7 +76,7 @@ impl Mission {
             && [planned_speed_mps, hole_tolerance_m, confidence_sd].iter().all(|number| **number >= 0.0)
     }
 
-    /// Whether pings land on the same wall places as in another mission.
+    /// Whether pings land at the same places on the wall as in another mission.
     ///
     /// True if tunnel, water, layout and hull are the same.
     pub fn places_as(&self, other: &Self) -> bool {

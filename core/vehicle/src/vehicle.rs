@@ -40,7 +40,8 @@ pub struct VehicleConfig {
     pub tunnel: TunnelConfig,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
-    /// Speed for which the heads' phases are planned, m/s; zero ignores the heads' positions along the hull.
+    /// Speed for which the heads' phases are planned, m/s. With zero, the heads' positions along the hull are
+    /// ignored.
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
@@ -72,7 +73,7 @@ pub type WaterConfig = Site;
 /// Allowed targets, m.
 pub(super) const TARGET_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 
-/// Limits of the startup allocation: some hundred megabytes each for sections and wall cells.
+/// Limits that keep the startup allocation to some hundred megabytes each for sections and wall cells.
 const MAX_SECTIONS: f64 = 400_000.0;
 const MAX_CELLS: f64 = 2e8;
 
@@ -106,7 +107,7 @@ impl VehicleConfig {
 
     /// Reads everything except the attachments.
     ///
-    /// Checks that depend on a wrong part are skipped.
+    /// Checks that depend on an invalid part of the file are skipped.
     fn from_root(
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
@@ -230,7 +231,7 @@ impl VehicleConfig {
         self.sensors.iter().filter_map(|sensor| sensor.head()).collect()
     }
 
-    /// Returns the inspection with the heads as configured and the vehicle steady in the centre.
+    /// Returns the inspection with the heads as configured and the vehicle steady in the tunnel's centre.
     ///
     /// Errors: no modes are known for a head's range setting.
     pub fn inspection(&self) -> Result<Inspection, String> {

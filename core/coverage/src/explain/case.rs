@@ -1,4 +1,5 @@
-//! A failed section, its surroundings, counts over both, and the drive with some factors removed.
+//! A failed section and its surroundings: counts over both, and the driving figures with some factors
+//! removed.
 
 use crate::cause::{Cause, Causes};
 use crate::frontier::Reach;
@@ -9,7 +10,7 @@ use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 use headrace_sampling::losses::MOST_PASSES;
 
-/// The removal of a factor helps only if it reduces the spacing to below this share.
+/// The removal of a factor helps only if it shrinks the spacing below this share of the actual spacing.
 pub(super) const HELPS: f64 = 0.93;
 /// Largest hole size for which the surroundings are searched for missing samples, in multiples of the target.
 pub(super) const WIDEST: f64 = 8.0;
@@ -82,7 +83,8 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole, up to the size of the target.
+/// Whether every live head has swept the hole. If the hole is larger than the target, only a part of the
+/// target's size counts.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];
@@ -91,8 +93,8 @@ pub(super) fn is_passed(case: &Case<'_>) -> bool {
 
 /// Whether the pings of silent heads can't be reconstructed.
 ///
-/// True in each of three cases: the heads sweep in sectors, a silent head never pinged, or all heads were silent
-/// for longer than the list of missing samples covers.
+/// True if the silent heads sweep in sectors, if one of them never pinged, or if all heads were silent for
+/// longer than the list of missing samples covers.
 pub(super) fn is_dark(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_in_sectors || is_unheard(case, seen)
 }
@@ -111,16 +113,16 @@ pub(super) fn is_remembered(case: &Case<'_>) -> bool {
     lacking.any(|lack| lack.why.has(Cause::HeadSilent))
 }
 
-/// Whether a missing sample lies in the middle of a hole.
+/// Whether a missing sample lies in the middle part of a hole.
 ///
-/// The middle is at most as large as the target, because samples from ahead may still shrink the hole.
+/// This part is at most as large as the target, because samples from ahead may still shrink the hole.
 pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
     let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
     math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
 }
 
 impl Drive {
-    /// Largest speed that leaves time for this many passes in place of one, m/s.
+    /// Largest speed that leaves time for `passes_needed` passes in place of one, m/s.
     ///
     /// Zero if so many returns are lost that no useful speed remains.
     pub(crate) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
@@ -137,8 +139,8 @@ impl Drive {
 
     /// Returns the driving figures with some factors removed.
     ///
-    /// `margin_m` is the target less a margin, m; a corrected speed is computed from it. With `all_turn`, no
-    /// head is silent or stalled.
+    /// If speed is among the removed factors, the lower speed is computed for `margin_m`: the target less a
+    /// margin, m. With `all_turn`, no head is silent or stalled.
     pub(super) fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
         let mut slower = 1.0;
@@ -173,7 +175,7 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
-            // Advised speeds allow for wall that the vehicle hides.
+            // Advised speeds are lower if the vehicle hides wall from some heads.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);
         }

@@ -69,7 +69,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
         StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
     let (mut store, mut lacks) = (SampleStore::new(layout), MissingSamples::default());
     let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
-    // The centre between two passes is the centre of the section.
+    // The section's centre lies half way between two passes.
     let rows = count(4.0, wall.along_m);
     let x_m = |i: i64| 10.125 + (i as f64 + 0.5) * wall.along_m;
     for i in (-rows..=rows).filter(|i| x_m(*i) < wall.end_m) {
@@ -169,9 +169,9 @@ fn both_causes_are_named_only_if_both_are_needed() {
 
 /// Heads slightly out of phase enlarge the hole.
 ///
-/// Without the other two factors, the section would pass despite the phase.
+/// The section would pass in spite of the phase if the other two factors were removed.
 #[test]
-fn only_two_causes_are_named_if_removing_two_of_three_suffices() {
+fn two_causes_are_named_if_removing_two_of_three_factors_suffices() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let drive = Drive { speed_mps: 0.35, gap_s: 2.4, healthy_gap_s: 2.4, ..sound() };
     let wall =
@@ -239,7 +239,8 @@ fn cause_has_the_same_word_in_text_and_json() {
     }
 }
 
-/// The fitting distance is driven in the time of all needed passes and of one ping.
+/// The largest speed that meets the target leaves time for a single pass. With losses, the same distance is
+/// driven in the time of all needed passes and one ping.
 #[test]
 fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
     let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };
@@ -287,8 +288,8 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
         let then = without(causes, all_turn);
         assert!(near(then.healthy_gap_s, gap_s), "{causes:?} {all_turn}: {}", then.healthy_gap_s);
     }
-    // A longer range doubles the time between passes. A finer mode takes half as long again. Both factors scale all
-    // times that depend on the turn period.
+    // A longer range doubles the time between passes, and a finer mode increases it by half. Both factors
+    // scale all times that depend on the turn period.
     for (causes, slower, finer) in [
         (&[Cause::OutOfRange][..], 2.0, 1.0),
         (&[Cause::AngularStep], 1.5, 0.5),
@@ -303,9 +304,9 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
     assert!(near(straight.swing_m, 0.0) && near(straight.t_y_m, 0.2) && near(straight.healthy_gap_s, 4.0));
 }
 
-/// With a target of 0.5 m and steps of 0.3 m along the wall, 0.4 m remain along the tunnel.
+/// With a target of 0.5 m and steps of 0.3 m along the wall, passes may be 0.4 m apart along the tunnel.
 #[test]
-fn drive_has_the_largest_fitting_speed_after_removing_the_speed_cause() {
+fn removing_the_speed_cause_lowers_the_speed_until_the_target_is_met() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
     let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
     // The vehicle drives 0.4 m in the time of one pass, 2 s, and one ping.
@@ -319,16 +320,17 @@ fn drive_has_the_largest_fitting_speed_after_removing_the_speed_cause() {
         (slowed_mps(Drive { speed_mps: 0.15, ..drive }) - 0.15).abs() < 1e-9,
         "the vehicle wasn't too fast"
     );
-    // If steps exceed the target, three tenths of the target remain along the tunnel.
+    // If steps exceed the target, passes may still be three tenths of the target apart.
     let coarse = Drive { t_y_m: 0.6, middle_t_y_m: 0.6, ..drive };
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
 }
 
-/// Passes 4 s apart at 0.1 m/s have the same distance as passes 2 s apart at the planned 0.2 m/s.
+/// Passes 4 s apart at 0.1 m/s have the same distance along the tunnel as passes 2 s apart at the planned 0.2
+/// m/s.
 ///
-/// The planned speed helps only if distances shrink by more than the factor `HELPS`.
+/// The planned speed helps only if it reduces this distance below the share `HELPS`.
 #[test]
-fn drive_has_the_planned_speed_after_removing_the_phase_cause_if_helpful() {
+fn removing_the_phase_cause_sets_the_planned_speed_if_that_shortens_gaps() {
     let then = |planned_gap_s: f64| {
         let drive = Drive {
             speed_mps: 0.1,

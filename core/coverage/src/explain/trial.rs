@@ -1,4 +1,4 @@
-//! A section's hole with some of the present factors removed.
+//! Computes the hole that a section would have with some of the present factors removed.
 
 use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_in, is_passed, is_unheard};
 use crate::cause::{Cause, Causes};
@@ -10,18 +10,20 @@ use crate::store::SampleStore;
 use headrace_geometry::math;
 use headrace_sampling::spacing;
 
-/// Share of the target that the hole may use if the speed is corrected, because a plan keeps a margin.
+/// Share of the target that the hole may use after the speed has been corrected. A plan keeps the rest as a
+/// margin.
 const MARGIN: f64 = 0.85;
-/// Limits of the factor that scales the wall.
+/// Limits of the factor by which the wall is compressed or stretched.
 ///
 /// A finer step or a longer range takes longer per turn, which stretches the wall.
 const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
-/// Multiple of the target above which the remaining hole has a cause that is not present.
+/// If the hole exceeds this multiple of the target with all present factors removed, its cause is unknown.
 const AT_MOST: f64 = 1.3;
 /// Maximum number of halvings in the search for the hole with all missing samples put back.
 const SEARCHED: u32 = 5;
-/// If more than this share of the missing samples has remaining causes, these causes alone make a hole.
+/// If more than this share of the missing samples remains after some factors are removed, the remaining
+/// factors alone cause a hole.
 const STAYS: f64 = 0.15;
 /// Maximum number of causes in a set.
 const MOST_NAMED: u32 = 3;
@@ -77,8 +79,8 @@ impl<'a> Trial<'a> {
     /// Smallest set of present factors without which the section would have met the target.
     pub(super) fn smallest(&mut self) -> Causes {
         let silent = Causes::of(Cause::HeadSilent);
-        // If no head pinged, silence is a certain cause, and driving is none. Other causes remain possible,
-        // because even pinging heads might not have detected the wall.
+        // If no head pinged, silence is a certain cause, and speed, step, swing and phase are not tested as
+        // causes. Other causes remain possible, because even pinging heads might not have detected the wall.
         let surely = if self.case.is_dark { silent } else { Causes::default() };
         if self.case.is_dark {
             let is_driven = |cause: &Cause| {
@@ -124,14 +126,14 @@ impl<'a> Trial<'a> {
             [Cause::NotPassed, Cause::HeadSilent, Cause::Phase, Cause::PositionLost].map(Causes::of);
         let is_short = self.is_short();
         let first = [
-            // If the wall was not passed, no other factor is known.
+            // If the heads have not swept the wall, no other factor is known.
             (true, not_passed),
             // If heads never pinged, no other factor is known.
             (is_unheard(self.case, self.seen), silent),
             // Speed is the easiest change, so it is named if the planned speed would have been enough.
             (!is_short && self.drive.is_slow_out_of_phase(1.0 / HELPS), phase),
         ];
-        // Factors that may only seem to explain the hole come last.
+        // Factors that would explain almost any hole come last.
         let last = [(self.is_only_adrift(), lost), (is_short, phase)];
         let present = self.present;
         let is_last = |set: &Causes| last.iter().any(|(is, last)| *is && set == last);
@@ -143,9 +145,8 @@ impl<'a> Trial<'a> {
         in_turn.filter(|set| set.is_within(present)).find(|set| self.passes_without(*set, 1.0))
     }
 
-    /// Whether a head is silent or has stalled.
-    ///
-    /// Without this head, the remaining heads are out of phase.
+    /// Whether a head is silent or stalled. The other heads then leave uneven gaps, as if they were out of
+    /// phase.
     fn is_short(&self) -> bool {
         self.present.has(Cause::HeadSilent) || self.present.has(Cause::HeadStalled)
     }
@@ -206,9 +207,9 @@ impl<'a> Trial<'a> {
             || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
     }
 
-    /// Distance between neighbouring samples with some factors removed, m, from the movement alone.
+    /// Distance between neighbouring samples with some factors removed, m, computed from the movement alone.
     ///
-    /// Infinite if many samples are missing because of the remaining factors.
+    /// Infinite if the remaining factors cause many missing samples.
     fn stays_m(&self, removed: Causes) -> f64 {
         let Case { bounds_m, lacks, .. } = *self.case;
         let (mut all, mut stay) = (0_u32, 0_u32);
@@ -223,9 +224,9 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(then.along_m(), 0.0, then.t_y_m)
     }
 
-    /// Whether enough samples remain despite random losses, once the beams no longer swing.
+    /// Whether enough samples remain despite random losses once the beams no longer swing.
     ///
-    /// The wall is not compressed for such losses.
+    /// The compression of the wall doesn't allow for these losses.
     fn is_sampled_without(&self, removed: Causes, target_m: f64) -> bool {
         let is_lossy = self.present.less(removed).has(Cause::MissingReturns);
         if !is_lossy || !removed.has(Cause::OffAxis) {
@@ -250,7 +251,8 @@ impl<'a> Trial<'a> {
         [now, now.without(removed, MARGIN * self.case.target_m, all_turn)]
     }
 
-    /// Diameter of the hole that driving has to explain, with all missing samples put back, m.
+    /// Diameter of the hole with all missing samples put back, m. The remaining factors must explain this
+    /// hole.
     ///
     /// The diameter is only as exact as the comparison with the two bounds requires.
     fn full_m(&mut self, [least_m, most_m]: [f64; 2]) -> f64 {
@@ -273,9 +275,9 @@ impl<'a> Trial<'a> {
         self.full_m[1]
     }
 
-    /// Stretch where samples may still land, for which the wall is mirrored.
+    /// Stretch where samples may still land. The wall is mirrored into it.
     ///
-    /// `None` if the hole extends beyond the passed stretch, where the wall is not mirrored.
+    /// `None` if not every live head has swept the hole. The wall is then not mirrored.
     fn to_come(&self) -> Option<Reach> {
         self.case.to_come.filter(|_| is_passed(self.case))
     }

@@ -1,10 +1,11 @@
-//! Early fail before the hole is final: an empty circle lies wholly where no more samples can land.
+//! Early fail, before the hole is final. It needs a large empty circle that lies wholly where no more samples
+//! can land.
 
 use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 
-/// Search resolution, m: a circle with a margin below this to the required radius may be missed.
+/// Search resolution, m. A circle that exceeds the required radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
 
 /// Required radius of a circle, as a function of the arc length of its centre.
@@ -20,9 +21,9 @@ pub struct Needed<'a> {
 impl HoleFinder {
     /// Whether a circle of the required radius, centred between two chainages, is certain to remain empty.
     ///
-    /// The circle holds no sample and lies outside each of `reaches`: where samples may still land, or where not all
-    /// heads have been. The distance to the nearest sample or to the reach is 1-Lipschitz. As in the search for
-    /// holes, tiles whose bound is too small are dropped and the others are halved.
+    /// The circle holds no sample and lies outside each of `reaches`: where samples may still land, or where
+    /// some heads have not been. The distance to the nearest sample or to the reach is 1-Lipschitz. As in the
+    /// search for holes, tiles whose bound is too small are dropped and the others are halved.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle(

@@ -24,7 +24,7 @@ pub(super) struct Share {
 }
 
 impl Share {
-    /// Returns the whole tile with these half edges as the share of one sample.
+    /// Returns the share of a single sample: the whole tile, with these half edges.
     fn whole(owner: (f64, f64), (half_x, half_arc): (f64, f64)) -> Self {
         let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
         let (low, high) = (-owner.1 - half_arc, -owner.1 + half_arc);
@@ -121,7 +121,8 @@ impl Division {
 
     /// Adds the share of a sample.
     ///
-    /// Returns false if the sample already has a share or there is no room for another: the tile is too large.
+    /// Returns false if the sample already has a share, or if there is no room for another. The tile must
+    /// then be halved.
     pub(super) fn add(&mut self, owner: (f64, f64)) -> bool {
         let same = |share: &Share| (share.owner.0 - owner.0).abs() + (share.owner.1 - owner.1).abs() <= 0.0;
         if self.shares.len() == MAX_OWNERS || self.shares.iter().any(same) {

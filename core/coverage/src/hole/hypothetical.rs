@@ -6,7 +6,8 @@ use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
 
-/// Search resolution as a share of the radius: a circle larger by less than this share may be missed.
+/// Search resolution as a share of the radius. A circle whose radius is larger by less than this may be
+/// missed.
 const FINE: f64 = 0.01;
 
 /// Hypothetical changes to the wall.
@@ -105,8 +106,8 @@ impl HoleFinder {
 
     /// Whether a circle of `radius_m` centred between two chainages holds no sample.
     ///
-    /// The search uses the wall laid out by [`lay_otherwise`](Self::lay_otherwise), which must have allowed for
-    /// circles at least this large.
+    /// The search uses the wall laid out by [`lay_otherwise`](Self::lay_otherwise), which must have been
+    /// called for circles at least this large.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle_otherwise(

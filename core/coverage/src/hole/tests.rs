@@ -98,7 +98,8 @@ proptest! {
         }
     }
 
-    /// D lies within the bounds of a tolerant search, whose distance is at most the tolerance.
+    /// D lies within the bounds found by a search with a tolerance. The bounds are at most the tolerance
+    /// apart.
     ///
     /// A verdict from these bounds equals the exact one, or is undecided if T lies between them.
     #[test]
@@ -143,7 +144,8 @@ proptest! {
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
     ) {
         let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
-        // Elsewhere, samples are closer together than the gap in the crowded cell.
+        // Everywhere else, samples are closer together than the gap in the crowded cell, so the largest hole
+        // is in that cell.
         let fence = (-6..=14).flat_map(|i| (0..180).map(move |k| (f64::from(i) * 0.05, f64::from(k) * 0.05)));
         samples.extend(fence.filter(|s| !(4.0..4.4).contains(&s.1)));
         let thinned = store(PERIMETER_M, &samples);
@@ -165,7 +167,7 @@ proptest! {
 
     /// In a small pipe, holes are wider than the perimeter.
     #[test]
-    fn pipe_narrower_than_its_holes_agrees_with_brute_force(
+    fn hole_wider_than_the_perimeter_agrees_with_brute_force(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
     ) {
         let hole = largest(1.1, &samples, 0.0, 0.5);
@@ -175,7 +177,7 @@ proptest! {
 
     /// On a lattice, every local maximum is equidistant from four samples.
     #[test]
-    fn hole_of_a_lattice_is_as_wide_as_its_diagonal(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
+    fn lattice_hole_is_as_wide_as_the_lattice_diagonal(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
         let darc = PERIMETER_M / f64::from(around);
         let mut samples = Vec::new();
         for i in -12..=12 {
@@ -189,7 +191,7 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// D does not depend on the order of the samples, on the seam or on the origin of the chainage.
+    /// D depends neither on the order of the samples, nor on the seam, nor on the origin of the chainage.
     #[test]
     fn hole_is_independent_of_sample_order_seam_and_chainage_origin(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
@@ -207,7 +209,7 @@ proptest! {
 }
 
 #[test]
-fn hole_without_a_sample_in_reach_is_unbounded() {
+fn hole_is_unbounded_if_no_sample_is_within_the_search_radius() {
     let empty = largest(PERIMETER_M, &[], 0.0, 0.25);
     assert!(!empty.bounded);
     let far = largest(PERIMETER_M, &[(35.0, 1.0)], 0.0, 0.25);
@@ -223,7 +225,7 @@ fn hole_of_a_single_sample_is_on_the_opposite_wall() {
 }
 
 #[test]
-fn hole_of_collinear_repeated_and_coincident_samples_is_right() {
+fn hole_of_collinear_repeated_and_coincident_samples_is_correct() {
     let line: Vec<_> = (0..90).map(|i| (0.1, f64::from(i) * 0.1)).collect();
     let expected = brute_force(PERIMETER_M, &line[..20], 0.0, 0.25);
     let hole = largest(PERIMETER_M, &line[..20], 0.0, 0.25);
@@ -237,7 +239,7 @@ fn hole_of_collinear_repeated_and_coincident_samples_is_right() {
 }
 
 #[test]
-fn hole_of_samples_with_nanometre_and_metre_spacings_is_right() {
+fn hole_of_samples_with_nanometre_and_metre_spacings_is_correct() {
     let mut samples: Vec<_> = (0..20).map(|i| (f64::from(i) * 1e-9, 3.0 + f64::from(i % 3) * 1e-9)).collect();
     samples.extend([(0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)]);
     let few = [(0.0, 3.0), (0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)];

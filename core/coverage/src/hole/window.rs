@@ -164,7 +164,7 @@ impl Window {
         );
     }
 
-    /// Whether the last cell ends with the last sample, which is so if all samples lie in cells.
+    /// Whether the last cell ends with the last sample. This is true if all samples lie in cells.
     fn is_sorted(&self) -> bool {
         self.begins.iter().rev().take(2).all(|end| *end as usize == self.spots.len())
     }
@@ -196,7 +196,7 @@ impl Window {
         let arc_m = arc_m - turn * self.perimeter_m;
         let mut best = Search { x_m, arc_m, limit2: within_m * within_m, enough2, found: None };
         let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
-        // The search proceeds outwards from the point's row, by one row to either side at a time.
+        // The search begins in the point's row and proceeds by one row on either side at a time.
         self.look_in_row(centre, &mut best);
         for ring in 1..self.rows {
             if best.is_enough() {

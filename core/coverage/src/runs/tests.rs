@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs, with the section states against which they are checked.
+/// Runs, together with the section states that they must match.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
@@ -146,7 +146,7 @@ fn most_frequent_cause_of_a_run_is_its_main_cause() {
 }
 
 #[test]
-fn run_splits_when_its_middle_passes_and_the_first_part_keeps_the_number() {
+fn run_splits_when_its_middle_sections_pass_and_the_first_part_keeps_the_number() {
     let mut rig = Rig::new();
     for section in 0..9 {
         rig.say(section, Some(Cause::MissingReturns), 0.6 + 0.1 * section as f64);

@@ -1,7 +1,7 @@
 //! Decides which sections are due for judging.
 //!
-//! A section is due if the heads have left it, or if a part of it may certainly fail. At the end of a dive, a
-//! section is due if its verdict may still change.
+//! During the dive, a section is due if the heads have left it, or if a part of it may already be certain to
+//! fail. At the end of a dive, a section is due if its verdict may still change.
 
 use super::super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::super::hole::{FARTHEST_M, Needed};
@@ -14,7 +14,7 @@ use headrace_geometry::math;
 /// This distance bounds the delay of a flag.
 const LOOK_M: f64 = 0.125;
 
-/// Limits that every finite reach has passed, so that the next movement causes a check.
+/// Initial limits. Every finite reach is beyond them, so the first movement causes a check.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Sections {
@@ -27,8 +27,8 @@ impl Sections {
 
     /// Sets the next places to check.
     ///
-    /// A check is due each time the heads have left a further part of a section: behind the vehicle, or ahead of a
-    /// vehicle that goes back.
+    /// A check is due each time the heads have left a further part of a section. This part lies behind the
+    /// vehicle, or ahead of a vehicle that goes back.
     fn look_again(&mut self, to_come: Option<Reach>) {
         let Some(Reach { from_m, to_m }) = to_come else { return };
         let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
@@ -43,8 +43,8 @@ impl Sections {
 
     /// Calls `ask` for every section of the coverage extent that is due after the heads have moved.
     ///
-    /// A section is due if it left the zone or was never in it, if its hole can get no more samples, or if a part of
-    /// it may certainly fail.
+    /// A section is due if it left the zone or was never in it, if its hole can get no more samples, or if a
+    /// part of it may already be certain to fail.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -102,9 +102,9 @@ impl Sections {
 
     /// Calls `ask` for sections in reach of a vehicle that is nearly stationary.
     ///
-    /// Without this call, these sections would get no verdict while the vehicle is stationary. A section is due if it
-    /// may certainly fail although its hole may still get samples, or if it is flagged and has new samples since it
-    /// was judged.
+    /// Without this call, these sections would get no verdict while the vehicle is stationary. A section is
+    /// due if it may be certain to fail although its hole may still get samples, or if it is flagged and has
+    /// new samples since it was judged.
     ///
     /// Allocates: never.
     pub fn look_around(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -122,9 +122,9 @@ impl Sections {
         }
     }
 
-    /// Whether a section already has an empty circle that is too large for the target, including the errors.
+    /// Whether a section already has an empty circle that exceeds the target by more than the errors.
     ///
-    /// All heads have passed the circle, and no more samples will land in it.
+    /// All heads have been at the circle, and no more samples will land in it.
     pub(super) fn fails_already(&self, request: &Request, judging: &mut Judging<'_>) -> bool {
         let Judging { store, finder, profile, .. } = judging;
         let Request { section: index, to_come, not_passed, .. } = *request;
@@ -194,7 +194,7 @@ mod tests {
 
     /// Around a stationary vehicle, a failed section is judged again only after new samples.
     ///
-    /// Every other section may come to fail at any time.
+    /// Every other section is judged at each check, because it may have become certain to fail.
     #[test]
     fn stationary_vehicle_judges_sections_with_new_samples() {
         let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
@@ -228,7 +228,7 @@ mod tests {
 
     /// Returns the requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on.
     ///
-    /// Each request has the section's index, and whether it is only for a certain fail.
+    /// Each request has the section's index, and whether it asks only for a certain fail.
     fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
         let mut sections = Sections::new(0.25, 0.5, 1.0, 10.0);
         set(&mut sections);
@@ -270,8 +270,8 @@ mod tests {
     #[test]
     fn section_left_without_a_verdict_is_judged() {
         let found = due(|_| {});
-        // All sections behind the zone are judged completely. At the zone's ends, sections may fail because of the
-        // part that was left. Sections ahead are not judged.
+        // All sections behind the zone get a full judgement. At the zone's ends, sections may fail because of
+        // the part that the heads have left. Sections ahead are not judged.
         let mut expected: Vec<_> = (4..12).map(|index| (index, false)).collect();
         expected.extend([(12, true), (15, true)]);
         assert_eq!(found, expected);
@@ -284,8 +284,8 @@ mod tests {
 
     /// A hole may fail early because of its part out of reach.
     ///
-    /// This part measures up to twice the distance of the hole's centre. A hole that lies completely out of reach
-    /// gets its final verdict.
+    /// The diameter of this part is twice the distance of the hole's centre from the heads' reach. A hole
+    /// that lies completely out of reach gets its final verdict.
     #[test]
     fn hole_is_judged_once_a_large_enough_part_is_out_of_reach() {
         let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
@@ -306,10 +306,10 @@ mod tests {
 
     const PERIMETER_M: f64 = 6.0 * core::f64::consts::PI;
 
-    /// Whether a section with one empty circle certainly fails, in a pipe of 3 m radius.
+    /// Whether a section with one empty circle is certain to fail, in a pipe of 3 m radius.
     ///
-    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw, rad.
-    /// Samples may still land from `to_come_m` on, and not all heads have passed wall up to 9 m.
+    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw,
+    /// rad. Samples may still land from `to_come_m` on. Up to 9 m, some heads have not been at the wall.
     fn fails(circle_m: f64, is_beside: bool, [along_m, yaw_rad]: [f64; 2], to_come_m: f64) -> bool {
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -361,7 +361,7 @@ mod tests {
         sections.fails_already(&request, &mut judging)
     }
 
-    /// The limit of the diameter is the target of 0.5 m plus three standard deviations.
+    /// The diameter of a circle must exceed the target of 0.5 m by three standard deviations.
     ///
     /// The error of a hole is 1.2 times that of a pass.
     #[test]

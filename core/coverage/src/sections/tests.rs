@@ -25,7 +25,7 @@ fn stretch_contains_all_existing_sections_that_it_touches() {
 ///
 /// A section that is not judged counts as open.
 #[test]
-fn each_section_counts_in_metres_once_by_its_latest_verdict() {
+fn each_section_counts_once_in_the_metres_of_its_latest_verdict() {
     let mut sections = sections();
     let [pass, fail] = [Verdict::Pass, Verdict::Fail].map(|verdict| Some(verdict as usize));
     for (before, now) in [(None, fail), (None, fail), (None, fail), (None, pass), (fail, pass), (fail, None)]
@@ -40,7 +40,7 @@ fn each_section_counts_in_metres_once_by_its_latest_verdict() {
 
 /// A section with pings has the error of its own passes.
 ///
-/// A section without pings has the largest error of the sections within T / 2, and no other.
+/// A section without pings has the largest error of the sections within half the target.
 #[test]
 fn section_without_pings_takes_the_largest_position_error_nearby() {
     let error_of = |placed_in: i64, asked: i64| {
@@ -170,7 +170,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
 ///
 /// The target is 0.5 m.
 #[test]
-fn hole_counts_all_visits_unless_the_newest_visit_alone_passes() {
+fn hole_uses_the_samples_of_all_visits_unless_the_newest_visit_alone_passes() {
     let fine_m = 0.2 * math::sqrt(2.0);
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");

@@ -24,11 +24,11 @@ use headrace_sampling::head::MAX_HEADS;
 const OPEN_BRICKS: usize = 64;
 /// Minimum length of a brick, m.
 const BRICK_M: f64 = 1.0;
-/// Maximum number of rows per brick: an open brick has a bit for each row in a `u32`.
+/// Maximum number of rows per brick, because an open brick has a bit for each row in a `u32`.
 const MOST_ROWS: usize = 32;
 /// Maximum number of samples in all open bricks.
 const OPEN_SAMPLES: usize = 1 << 18;
-/// Overhead words per brick: unused words in the last block, and head switches.
+/// Overhead words per brick: unused words in the last block, and words that switch heads.
 const WORDS_PER_BRICK: usize = 48;
 
 /// A sample on the unrolled wall.
@@ -106,7 +106,7 @@ pub struct StoreUse {
     pub kept: u64,
     /// Number of samples dropped by thinning.
     pub thinned: u64,
-    /// Number of bytes in use now or before, which the OS has mapped.
+    /// Number of bytes that have been used so far, which the OS has mapped.
     pub bytes: usize,
 }
 
@@ -323,7 +323,7 @@ impl SampleStore {
     }
 
     fn bricks_between(&self, from_m: f64, to_m: f64) -> core::ops::RangeInclusive<u32> {
-        // Packing may have moved a sample near the edge of a brick beyond this edge.
+        // Packing may have moved a sample near the edge of a brick across this edge.
         self.brick_of(self.row_near(from_m - packed::MOVED_M))
             ..=self.brick_of(self.row_near(to_m + packed::MOVED_M))
     }

@@ -104,7 +104,7 @@ impl OpenBricks {
         self.used
     }
 
-    /// Number of bytes in use now or before.
+    /// Number of bytes that have been used so far.
     pub(super) fn touched_bytes(&self) -> usize {
         self.nodes.len() * size_of::<Node>() + self.cells.len() * size_of::<Cell>()
     }

@@ -138,7 +138,7 @@ impl Arena {
         (self.most - self.used) * ROOM
     }
 
-    /// Number of bytes in use now or before.
+    /// Number of bytes that have been used so far.
     pub(super) fn touched_bytes(&self) -> usize {
         self.blocks.len() * size_of::<[u32; ROOM + 1]>()
     }

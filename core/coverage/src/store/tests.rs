@@ -232,7 +232,7 @@ fn full_store_keeps_all_stored_samples() {
 
 /// Four heads at 50 pings per second spend an hour on one spot, with centimetre jitter.
 #[test]
-fn stationary_vehicle_stops_using_more_memory() {
+fn memory_stops_growing_while_the_vehicle_is_stationary() {
     let mut store = SampleStore::new(LAYOUT);
     let (mut hashed, mut after_half) = (1_u64, None);
     let mut noise_m = || {
@@ -278,7 +278,7 @@ fn step_is_dropped_only_near_a_step_in_the_same_direction() {
 
 /// Memory and error do not grow while the vehicle drives back and forth over one stretch.
 #[test]
-fn hundred_passes_back_and_forth_do_not_grow_memory() {
+fn memory_does_not_grow_over_a_hundred_passes_back_and_forth() {
     let mut store = SampleStore::new(LAYOUT);
     let mut after_seventy = None;
     for round in 0..100 {
@@ -327,7 +327,7 @@ fn packing_keeps_the_visit_number_of_each_sample() {
 
 /// One stretch may hold as many samples as fit into all open bricks.
 #[test]
-fn packed_stretch_that_fills_all_open_blocks_is_read_again() {
+fn packed_stretch_that_fills_all_open_bricks_can_be_read() {
     let mut store = SampleStore::new(StoreLayout { capacity: 4, ..LAYOUT });
     for k in 0..4 {
         let at = f64::from(k);

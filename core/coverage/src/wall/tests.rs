@@ -1,4 +1,4 @@
-//! Heads in a round tunnel with any wall, and the classification of their returns.
+//! Heads in a round tunnel whose wall has an arbitrary shape, and the classification of their returns.
 
 use super::*;
 use headrace_geometry::math::{self, TAU};
@@ -92,7 +92,7 @@ fn smooth_rough_and_wide_walls_are_accepted_in_tunnels_of_any_size() {
         // The wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one along it.
         Turning::new(radius_m, 2)
             .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
-        // A vehicle beside its estimated place in the centre measures these ranges.
+        // A vehicle measures these ranges if it is not in the centre, where its estimated position is.
         Turning::new(radius_m, 1).all_wall(10, |_, angle| radius_m * (1.0 + 0.15 * math::sin(angle)));
     }
 }
@@ -100,7 +100,7 @@ fn smooth_rough_and_wide_walls_are_accepted_in_tunnels_of_any_size() {
 #[test]
 fn boulders_and_niches_are_wall_including_their_edges() {
     for (inward_m, half_width) in [(1.5, 0.1), (-2.0, 0.15), (3.0, 0.3)] {
-        // Objects are at least three steps wide. Each edge is a single return.
+        // Objects are at least three steps wide. At their edges the range jumps from one return to the next.
         Turning::new(6.0, 1).all_wall(8, |x_m, angle| {
             let within = (0.5..2.0).contains(&x_m) && (angle - 3.0).abs() < half_width;
             if within { 6.0 - inward_m } else { 6.0 }
@@ -125,7 +125,7 @@ fn object_seen_in_one_turn_is_doubtful_and_object_seen_again_is_wall() {
         };
         let count = &Turning::new(radius_m, 1).turn(6, pole)[0];
         assert_eq!((count.wall, count.doubtful), (6 * STEPS as usize - 5, 5), "{radius_m}");
-        // An echo off two walls occurs three times in succession.
+        // An echo off two walls gives three successive returns, in one turn only.
         let echo = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
             Some(if turn == 2 && (angle - 3.0).abs() < 1.6 * TAU / f64::from(STEPS) {
                 1.9 * radius_m
@@ -222,7 +222,7 @@ fn outvoted_head_is_distrusted_until_it_agrees_with_the_others() {
         }
         let counts = turning.turn(6, frozen);
         assert_eq!((counts[wrong].wall, counts[wrong].doubtful), (0, 6 * STEPS as usize));
-        // The chainage begins at zero again, as if the vehicle had gone back.
+        // The chainage begins at zero again, as if the vehicle had gone back to its start.
         turning.turn(4, |_, _, _, _| Some(1.0));
         let counts = turning.turn(4, |_, _, _, _| Some(1.0));
         assert_eq!(counts[wrong].doubtful, 0, "the head is trusted again");
@@ -262,7 +262,7 @@ fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_the_centre() {
 
 /// Off the centre, a constant range agrees with the wall for a part of each turn.
 #[test]
-fn stuck_head_is_distrusted_until_its_range_moves() {
+fn stuck_head_is_distrusted_until_its_range_varies() {
     for (radius_m, out_m) in [(1.0, 0.3), (6.0, 1.0)] {
         let mut turning = Turning::new(radius_m, 1);
         let limits = turning.limits;
@@ -291,7 +291,7 @@ fn stuck_head_is_distrusted_until_its_range_moves() {
             }
         }
         let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
-        // All wall samples since the head got stuck are withdrawn, and no earlier samples.
+        // All wall samples since the head got stuck are withdrawn, and no sample from before.
         let begun_m = 0.001 * f64::from(2 * STEPS);
         assert!((from_m - begun_m).abs() <= 0.001 + 1e-9, "{from_m}");
         assert!(

@@ -14,12 +14,12 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Time after the first update from which data or positions that never arrived count as missing.
+/// Grace period after the first update. Data or positions that haven't arrived by its end count as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
-/// Time for which `CannotSay` stays active after its stretch has last grown.
+/// Time for which `CannotSay` stays active after the last growth of its stretch.
 const GROWS: DurNs = DurNs(10_000_000_000);
-/// Remaining cable, time and charge, percent, at or below which a warning, an alarm and an emergency alarm
-/// are raised.
+/// Thresholds for the remaining cable, time and charge, percent, at which a warning, an alarm and an
+/// emergency alarm are raised.
 ///
 /// A negative share means that the limit is exceeded.
 const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
@@ -29,7 +29,7 @@ const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
 /// alert ends.
 const MORE_PCT: f64 = 2.0;
 
-/// Data and positions seen so far.
+/// Record of the data and positions that have arrived so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Had {
     position: bool,
@@ -48,7 +48,7 @@ pub(crate) struct Beat<'a> {
     pub(crate) setting: Option<SettingDoubt>,
 }
 
-/// A condition that may hold.
+/// A condition that was checked, and whether it holds.
 pub(super) struct Seen {
     pub(super) kind: ListKind,
     pub(super) source: Option<SourceId>,
@@ -121,7 +121,8 @@ impl AlertList {
             .advice
             .as_ref()
             .map_or(Figures::None, |advice| Figures::Advice(AdviceFigures::of(advice, speed_mps)));
-        // Slightly over v_max the alert stays as it is: that range of speeds is its dead band.
+        // Slightly over v_max the alert neither begins nor ends, because that range of speeds is its dead
+        // band.
         let is_over = condition == Condition::Over && self.is_active(ListKind::TooFast, None);
         let too_fast = condition == Condition::TooFast || is_over;
         self.observe(at, &Seen::of(ListKind::TooFast, too_fast, figures), to);
@@ -360,7 +361,7 @@ impl AlertList {
 }
 
 impl Figures {
-    /// Figures of a continuing situation: the present figures, but the highest speed so far.
+    /// Figures of a continuing situation: the present ones, except that the speed is the highest so far.
     ///
     /// Once the pilot has slowed down, the present speed would no longer show by how much the limit was
     /// exceeded.

@@ -91,7 +91,7 @@ pub struct SettingJson {
     ///
     /// It is an angle about the head's axis, a pitch or a yaw.
     pub angle_deg: Option<f64>,
-    /// Difference from the correct value, in standard deviations.
+    /// Difference between the file's value and the correct one, in standard deviations.
     pub sure_ratio: f64,
 }
 
@@ -289,7 +289,7 @@ impl AlertList {
         counts
     }
 
-    /// Remaining cable, time and charge, as of a live state.
+    /// Remaining cable, time and charge at the time of a live state.
     pub fn left(&self, state: &LiveState) -> LeftJson {
         LeftJson {
             cable_m: self.cable_left_m(state.chainage_m),

@@ -56,13 +56,13 @@ pub enum ListKind {
     SensorSilent,
     /// A head doesn't turn.
     SensorStalled,
-    /// Successive returns of a head disagree: they are noise.
+    /// Successive returns of a head disagree, so they are noise.
     HeadScattered,
     /// A head's range stays constant although it must change at the vehicle's place.
     HeadConstant,
     /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
-    /// The cable counter differs from the inertial unit or from a velocity log: one of them is wrong.
+    /// The cable counter differs from the inertial unit or from a velocity log, so one of them is wrong.
     CableDoubted,
     /// Ranges contradict a setting of the vehicle file.
     SettingDoubted,

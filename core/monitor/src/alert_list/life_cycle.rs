@@ -113,8 +113,8 @@ impl AlertList {
             self.share_one(at, to);
         }
         let oldest = self.alerts.iter().position(|alert| !alert.is_live());
-        // If all alerts are live, most of them are missed stretches: the list has far more entries than there
-        // are other situations.
+        // If all alerts are live, most of them are missed stretches, because the list has far more entries
+        // than there are other situations.
         let oldest =
             oldest.or_else(|| self.alerts.iter().position(|alert| alert.priority == Priority::Caution));
         if let Some(oldest) = oldest {
@@ -123,8 +123,8 @@ impl AlertList {
         }
     }
 
-    /// Reactivates an alert: its condition holds again before an acknowledgement, or continues with other
-    /// figures.
+    /// Reactivates an alert whose condition holds again before anybody has acknowledged it, or continues with
+    /// other figures.
     pub(super) fn hold_again(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         (alert.state, alert.rectified) = (AlertState::Active, None);

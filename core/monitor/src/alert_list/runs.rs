@@ -60,7 +60,7 @@ impl AlertList {
     }
 
     fn set_alert_of(&mut self, id: RunId, number: u32) {
-        // The capacity suffices: there are no more runs than sections.
+        // The capacity suffices, because there are no more runs than sections.
         while self.by_run.len() <= id.0 as usize && self.by_run.len() < self.by_run.capacity() {
             self.by_run.push(0);
         }
@@ -175,8 +175,8 @@ impl AlertList {
         to.tell(&kept, AlertChange::Changed, at);
     }
 
-    /// Merges the newest missed stretch into its nearest neighbour, which frees an entry of a list full of
-    /// live alerts.
+    /// Merges the newest missed stretch into its nearest neighbour. This frees an entry in a list that is
+    /// full of live alerts.
     pub(super) fn share_one(&mut self, at: MonoNs, to: &mut Telling<'_>) {
         let stretches = || {
             let missed = self.alerts.iter().filter(|alert| alert.kind == ListKind::Missed && alert.is_live());

@@ -76,7 +76,7 @@ const BEAT_MS: u64 = 200;
 struct Oracle {
     history: Vec<(u64, bool)>,
     is_caution: bool,
-    /// Number, state, acknowledged, silenced until and count of each alert.
+    /// For each alert: number, state, whether it is acknowledged, time until which it is silenced, and count.
     all: Vec<(u32, &'static str, bool, u64, u32)>,
 }
 
@@ -166,8 +166,8 @@ fn happens() -> impl Strategy<Value = Happens> {
 }
 
 proptest! {
-    /// After any conditions and operator commands, every alert is in the state that the table of MSC.302(87)
-    /// gives.
+    /// After an arbitrary sequence of conditions and operator commands, every alert is in the state that the
+    /// table of MSC.302(87) gives.
     #[test]
     fn alert_life_cycle_follows_the_msc_table(
         steps in proptest::collection::vec((happens(), 1usize..8), 1..120),
@@ -293,9 +293,9 @@ fn higher_priority_needs_a_new_acknowledgement() {
     assert_eq!(battery(&bench), Some((Priority::EmergencyAlarm, true)));
 }
 
-/// Later occurrences change the figures of the alert that goes on. They are no change of the list.
+/// Later occurrences only update the figures of the active alert. They publish no notice.
 #[test]
-fn occurrences_update_the_figures_without_a_notice() {
+fn later_occurrences_update_the_alert_figures_and_publish_no_notice() {
     let mut bench = Bench::new(0.0, 5.0);
     let mut state = crate::live_state::test_state();
     let mut beat = |bench: &mut Bench, at: MonoNs, occurrences: Occurrences| {
@@ -315,7 +315,7 @@ fn occurrences_update_the_figures_without_a_notice() {
 }
 
 #[test]
-fn contradiction_found_at_the_end_of_a_dive_has_one_alert() {
+fn contradiction_found_at_the_end_of_a_dive_raises_one_alert() {
     let mut bench = Bench::new(1.0, 5.0);
     let (mut observations, at) = (Observations::default(), MonoNs(9));
     observations.note(ObservedKind::ProfileContradicted, at, 7.0, 0.4);

@@ -84,7 +84,7 @@ impl ListedAlert {
                 format!("CAN'T SAY {place}: {}", unsure_text(&around.unsure(stretch)))
             }
             (ListKind::TooFast, Figures::Advice(figures)) => {
-                // The present speed is on every screen.
+                // The text omits the present speed, which every screen shows.
                 format!("TOO FAST: up to {:.2} m/s", figures.speed_mps.abs())
             }
             (ListKind::TurnFails, Figures::Advice(figures)) => {

@@ -17,7 +17,7 @@ const AT: MonoNs = MonoNs(9_000_000_000);
 
 /// Live state after an update with this position error between passes.
 ///
-/// The target is half a metre, with two standard deviations.
+/// The target is half a metre, and the confidence is two standard deviations.
 fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {
     let pose = Pose { position: Point3::new(12.5, 0.0, 3.0), attitude: Rot::identity() };
     let relative = Relative::along(pass_error_m);
@@ -45,7 +45,7 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
     alerter.state
 }
 
-/// Two standard deviations may be at most a fifth of the target.
+/// The position is doubtful once two standard deviations exceed a fifth of the target.
 #[test]
 fn position_is_doubtful_if_passes_are_uncertain_or_the_cable_is_distrusted() {
     let spread = PositionState::Doubtful(PositionDoubt::Spread);
@@ -143,7 +143,7 @@ impl Bench {
 }
 
 #[test]
-fn command_precedes_the_results_of_the_next_event() {
+fn command_is_applied_before_the_results_of_the_next_event() {
     for (before, acknowledged) in [(4, 0), (5, 0), (6, 1), (9, 1)] {
         let found = Bench::new(run(5, false), before).until(None);
         assert_eq!(found, (1, acknowledged, 1 - acknowledged as u64, Some(9)), "{before}");
@@ -151,7 +151,7 @@ fn command_precedes_the_results_of_the_next_event() {
 }
 
 #[test]
-fn update_includes_only_earlier_inputs() {
+fn update_applies_only_earlier_inputs() {
     let at =
         |run: RunInput, command_before: usize, beat: usize| Bench::new(run, command_before).until(Some(beat));
     assert_eq!(at(run(4, false), 9, 5), (1, 0, 0, Some(4)));

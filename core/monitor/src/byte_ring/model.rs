@@ -1,8 +1,8 @@
 //! A ring for loom, which explores all orders of memory accesses and all effects of weak memory ordering.
 //!
 //! The indices are loom's atomics, with the same memory orderings as in ringbuf. The bytes are visible as
-//! soon as they are stored. The model is still as weak as ringbuf: only the indices decide which bytes a
-//! reader may see.
+//! soon as they are stored. The model still shows every behaviour of ringbuf, because only the indices decide
+//! which bytes a reader may see.
 
 use std::sync::atomic::AtomicU8;
 use std::sync::atomic::Ordering::Relaxed;
@@ -26,7 +26,8 @@ impl Shared {
     }
 }
 
-/// Writing end. It caches its own index: with an additional load, loom would miss orders of accesses.
+/// Writing end. It caches its own index, because an additional load would make loom miss some orders of
+/// accesses.
 pub struct ModelProducer {
     shared: Arc<Shared>,
     write: usize,

@@ -62,7 +62,7 @@ fn note_refused_by_a_full_queue_is_not_counted() {
 }
 
 #[test]
-fn invalid_command_is_refused_with_the_place_of_the_error() {
+fn error_for_an_invalid_command_gives_the_first_wrong_byte() {
     let long = format!(r#"{{"do":"note","text":"{}","by":"AB"}}"#, "x".repeat(241));
     let longest = format!(r#"{{"do":"time"{}}}"#, " ".repeat(500));
     for json in [

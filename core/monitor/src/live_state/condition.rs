@@ -7,13 +7,14 @@ use headrace_fusion::NoFix;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::advice::Reason;
 
-/// Ratio to v_max above which a speed is over v_max.
+/// Ratio of the speed to v_max above which the speed counts as over v_max.
 ///
 /// The margin covers the measurement error and the advice's own margin.
 const OVER: f64 = 1.02;
-/// Ratio to v_max below which a speed is clearly below v_max.
+/// Ratio of the speed to v_max below which the speed is clearly below v_max.
 const UNDER: f64 = 0.97;
-/// Ratio to v_max above which a speed is too fast. A pilot who follows the advice stays below this ratio.
+/// Ratio of the speed to v_max above which the speed is too fast. A pilot who follows the advice stays below
+/// this ratio.
 const TOO_FAST: f64 = 1.05;
 
 /// Present condition. If several conditions hold, the first one in this list counts.
@@ -29,7 +30,7 @@ pub enum Condition {
     Outside(f64),
     /// No profiling head delivers readings.
     NoSonar,
-    /// All wall here has passed, and the position is reliable: any speed is fine.
+    /// All wall here has the verdict pass, and the position is reliable: any speed is fine.
     Passed,
     /// The vehicle is going back to this chainage (m) too fast for coverage. From there it will pass a missed
     /// stretch again.
@@ -99,7 +100,7 @@ impl Condition {
 }
 
 impl LiveState {
-    /// Whether the spacing T that is forecast at the present speed is above this limit, m, or unbounded.
+    /// Whether the spacing T forecast at the present speed exceeds this limit, m, or is unbounded.
     fn turn_exceeds(&self, limit_m: f64) -> bool {
         self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)
     }
@@ -139,7 +140,7 @@ impl LiveState {
         }
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
-            // The forecast is latched for a second. The present turn may already be better.
+            // `will_exceed` stays set for a second. The present turn may already be better.
             _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => {
                 Condition::TurnFails
             }

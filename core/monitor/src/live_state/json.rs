@@ -1,5 +1,5 @@
-//! The live state as JSON. It has plain values with units in their names, ages up to the tick, and a mark on
-//! stale data.
+//! The live state as JSON. It has plain values with units in their names. Ages are measured up to the tick,
+//! and stale data is marked.
 //!
 //! `docs/reference/live-state.schema.json` is the schema. Allocates: outlets' threads only, never the loop's.
 
@@ -103,9 +103,9 @@ pub struct MarginsJson {
 pub struct TurnJson {
     /// Target T, m.
     pub target_m: f64,
-    /// Forecast T, m; `None` if it is unbounded.
+    /// Forecast spacing T, m; `None` if it is unbounded.
     pub predicted_t_m: Option<f64>,
-    /// Whether the forecast T will exceed the target.
+    /// Whether the forecast spacing T will exceed the target.
     pub will_exceed: bool,
     /// Largest step along the wall, m.
     pub t_y_m: f64,

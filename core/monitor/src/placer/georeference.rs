@@ -123,7 +123,7 @@ fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel
     }
 }
 
-/// Angle beside the occluded angles at which the vehicle may also return echoes, radians.
+/// Margin on either side of the occluded angles, radians. Within it, the vehicle may also return echoes.
 const BESIDE_RAD: f64 = 0.09;
 /// A return at an occluded angle is from the vehicle if its range is below this share of the range to the
 /// wall.

@@ -139,7 +139,7 @@ mod tests {
 
     /// Updates come five times a second, from the first packet on.
     #[test]
-    fn each_update_is_due_once_and_a_gap_gives_only_the_latest() {
+    fn each_update_is_due_once_and_only_the_latest_is_due_after_a_gap() {
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
         let mut next = None;
         for (now_s, beat_s) in [

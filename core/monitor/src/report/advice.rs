@@ -17,15 +17,14 @@ pub struct AdviceReport {
     pub speed_mps: f64,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,
-    /// Speed below which heads apart along the hull run out of phase, m/s; zero if a lower speed always
-    /// helps.
+    /// Speed below which heads at different places along the hull run out of phase, m/s; zero if a lower
+    /// speed always helps.
     pub from_mps: f64,
-    /// Of the speeds that meet the target, the one nearest to the present speed, m/s; `None` if the present
-    /// speed meets it.
+    /// Speed nearest to the present one that meets the target, m/s; `None` if the present speed meets it.
     pub nearest_mps: Option<f64>,
     /// Limiting factor.
     pub reason: &'static str,
-    /// T predicted at the present speed, m.
+    /// Spacing T predicted at the present speed, m.
     pub predicted_t_m: Option<f64>,
     /// Whether the present turn will exceed the target at the present speed.
     pub will_exceed: bool,

@@ -180,7 +180,7 @@ pub struct SummaryReport {
     pub cannot_say_m: f64,
     /// Metres still open.
     pub open_m: f64,
-    /// Metres that not all heads have passed, where the vehicle began or turned back.
+    /// Metres where some heads have not been, because the vehicle began or turned back there.
     pub not_inspected_m: f64,
     /// Number of fails that were flagged.
     pub flags_raised: u32,

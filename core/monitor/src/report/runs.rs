@@ -21,8 +21,8 @@ pub struct RunReport {
     /// Figures for the causes that the text names. Each comes from a section with that cause.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
-    /// Source ids of the silent heads. They are those of the section with the largest hole, or of the section
-    /// that represents silence as a cause.
+    /// Source ids of the heads that were silent in the section with the largest hole, or in the section that
+    /// represents silence as a cause.
     pub silent_sources: Vec<String>,
     /// Beginning, m.
     pub start_m: f64,
@@ -114,7 +114,7 @@ fn head_ids(dive: &Loop) -> Vec<String> {
     dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
-/// Stretches to pass again by the present verdicts: all open runs, from the far end to the portal.
+/// Stretches to pass again according to the present verdicts: all open runs, from the far end to the portal.
 pub fn go_back(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());

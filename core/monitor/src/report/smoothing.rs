@@ -30,7 +30,7 @@ pub struct MetresReport {
     pub cannot_say_m: f64,
     /// Metres still open.
     pub open_m: f64,
-    /// Metres that not all heads have passed.
+    /// Metres where some heads have not been.
     pub not_inspected_m: f64,
 }
 

@@ -6,7 +6,7 @@ use crate::resources::Coverage;
 use headrace_coverage::soundings::ENOUGH;
 use headrace_geometry::tunnel::Profile;
 
-/// Samples by node of a square grid over the passed sections.
+/// Samples by node of a square grid over the sections of the coverage extent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SurveyReport {
     /// Edge of a node along the tunnel, m.
@@ -15,9 +15,9 @@ pub struct SurveyReport {
     pub around_m: f64,
     /// Minimum samples per node.
     pub enough: u16,
-    /// Number of nodes passed.
+    /// Number of nodes in the coverage extent.
     pub nodes: u32,
-    /// Share of the passed nodes that have enough samples; `None` without nodes.
+    /// Share of these nodes that have enough samples; `None` without nodes.
     pub enough_share: Option<f64>,
     /// Number of nodes without a sample.
     pub empty: u32,

@@ -28,7 +28,7 @@ mod tests {
     use headrace_fusion::NoFix;
 
     #[test]
-    fn every_ping_is_counted_once_by_its_outcome() {
+    fn every_ping_is_counted_once_under_its_outcome() {
         let mut tally = Tally::default();
         let of = |outcome: Outcome, has_fix: bool| {
             let ping = pinged(5.1, 1.0);

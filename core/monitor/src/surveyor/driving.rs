@@ -19,7 +19,8 @@ use headrace_sampling::swing::Looks;
 
 /// Longest time between neighbouring passes for which the rotation of the vehicle is looked up, seconds.
 const LONGEST_S: f64 = 50.0;
-/// Relative change of the time between passes above which the fitting speed is computed again.
+/// Relative change of the time between passes above which the fitting speed, the largest one that meets the
+/// target, is computed again.
 const SAME_PASSES: f64 = 0.01;
 /// Search for the fitting speed: number of speeds tried, and ratio of each speed to the previous one.
 const SLOWER: u32 = 80;
@@ -100,7 +101,7 @@ impl Driving {
         let place_m = [pose.position.y(), pose.position.z()];
         self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
-        // Two neighbouring passes may belong to heads apart along the hull.
+        // Two neighbouring passes may belong to heads at different places along the hull.
         let apart_s = apart_m(situation) / situation.speed_mps.abs().max(SLOW_MPS);
         let since = at - DurNs::from_secs_f64((self.now.healthy_gap_s + apart_s).min(LONGEST_S));
         let turned_rad = self.looks.turned_since(look, since);
@@ -108,7 +109,8 @@ impl Driving {
         self.looks.keep(at, look);
     }
 
-    /// Updates the fitting speed if the heads' passes have changed.
+    /// Updates the fitting speed, which is the largest one that meets the target, if the heads' passes have
+    /// changed.
     fn note_fit(&mut self, healthy: &Situation, plan: &Plan) {
         let now = &mut self.now;
         let Plan { target_m, confidence_sd, .. } = *plan;
@@ -291,7 +293,7 @@ mod tests {
     /// Four heads are a quarter of a turn apart and turn in 8 s. Without one of them, the longest gap is half
     /// a turn.
     #[test]
-    fn stalled_head_counts_as_stalled_until_back_in_phase() {
+    fn stalled_head_counts_as_stalled_until_it_is_back_in_phase() {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
@@ -379,7 +381,7 @@ mod tests {
 
     /// The farther the vehicle is from the centre, the longer is a step on the opposite wall.
     #[test]
-    fn steps_are_recomputed_after_5_cm_sideways_or_a_new_head_step() {
+    fn steps_are_recomputed_after_a_5_cm_move_sideways_or_a_changed_head_step() {
         let profile = shapes::circle(3.0).unwrap();
         let mut driving = Driving::default();
         let mut t_y_m = |aside_m: f64, finer: f64| {

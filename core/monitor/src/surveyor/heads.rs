@@ -1,4 +1,4 @@
-//! Heads, as the systems of a walk see them.
+//! Query for the heads, which the systems of a walk share.
 
 use bevy_ecs::prelude::Query;
 

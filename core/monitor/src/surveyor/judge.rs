@@ -69,8 +69,8 @@ fn judge_one(
 
 /// Records changed runs for the list of alerts.
 ///
-/// Cleared runs come last. The alert of a cleared run passes to the runs that remain of it, so the list must
-/// have these runs first.
+/// Cleared runs come last. The runs that remain of a cleared run take over its alert, so the list must have
+/// these runs first.
 fn note_runs(notices: &[Notice], stop: (usize, bool), sections: &Sections, runs: &mut Vec<RunInput>) {
     for cleared in [false, true] {
         for notice in notices {
@@ -106,9 +106,9 @@ mod tests {
 
     const AT: MonoNs = MonoNs(7_000_000_000);
 
-    /// Judges a section without samples, at 20 m of distance from places where samples may still land.
+    /// Judges a section without samples, 20 m from the places where samples may still land.
     ///
-    /// Some heads haven't passed `not_passed_m`, m.
+    /// Up to chainage `not_passed_m`, m, some heads have not been in the tunnel.
     fn judged(coverage: &mut Coverage, section: i64, not_passed_m: f64) -> (Vec<Notice>, Vec<RunInput>) {
         let request = Request {
             section,
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn fail_is_published_with_its_run_and_unsure_section_with_its_stretch() {
+    fn fail_publishes_its_run_and_unsure_section_publishes_its_stretch() {
         let mut coverage = coverage();
         let (notices, runs) = judged(&mut coverage, 40, -20.0);
         let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };
@@ -140,8 +140,8 @@ mod tests {
         assert_eq!((notices, coverage.unsure), (vec![run, section], None));
         let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_beat, run.at));
         assert_eq!(found.collect::<Vec<_>>(), [(RunId(0), RunChange::Raised, 3, true, AT)]);
-        // If not all heads have passed, there is no verdict. Neighbouring sections form one stretch, and a
-        // distant section another.
+        // There is no verdict if some heads have not been in the section. Neighbouring sections without a
+        // verdict form one stretch, and a distant section forms another.
         for (section, from, to, sections) in [(20, 20, 21, 1), (21, 20, 22, 2), (60, 60, 61, 1)] {
             let (notices, runs) = judged(&mut coverage, section, 20.0);
             assert_eq!((notices.len(), runs.len()), (1, 0));
@@ -151,10 +151,9 @@ mod tests {
         }
     }
 
-    /// The alert of a cleared run passes to the runs that remain of it, so the list must have these runs
-    /// first.
+    /// The runs that remain of a cleared run take over its alert, so the list must have these runs first.
     #[test]
-    fn cleared_runs_come_last_and_runs_without_room_are_dropped() {
+    fn cleared_runs_come_last_and_runs_beyond_the_capacity_are_dropped() {
         let mut coverage = coverage();
         for section in [20, 40, 60] {
             judged(&mut coverage, section, -20.0);

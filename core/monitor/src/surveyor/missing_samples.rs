@@ -60,7 +60,7 @@ impl Turning {
 
     /// Decides at random whether a simulated ping is lost, at the head's loss rate.
     ///
-    /// The time of the ping gives the random number.
+    /// The random number depends only on the time of the ping.
     fn would_lose(&mut self, when: MonoNs, rate: LossRate) -> bool {
         let LossRate { share, after_lost } = rate;
         // The loss rate after a return is unknown if all pings were lost, or if every loss was followed by
@@ -237,7 +237,7 @@ pub(super) fn note_beat(
     let speed_mps = situation.speed_mps;
     for (number, mounted, hidden, ..) in heads {
         let Some(head) = turning.get_mut(number.0) else { continue };
-        // Until a stalled head is in phase again, its samples are missing at the place that it should have.
+        // Until a stalled head is in phase again, its samples are missing where its scheduled angle points.
         let out_of_step = stalled.has(number.0);
         let late = |moved: &MonoNs| out_of_step || at.since(*moved).0 > LACKING_AFTER.0;
         let Some(moved) = head.moved.filter(late) else { continue };
@@ -398,7 +398,7 @@ impl Placing<'_> {
         // causes.
         let made = why == Causes::of(Cause::PositionLost);
         if ping.is_lost {
-            // At wall that the head could not have detected anyway, a ping is not lost by chance.
+            // A ping at wall that the head could not have detected anyway is not lost by chance.
             let elsewhere = |why: Causes| why.without(Cause::MissingReturns);
             let is_far = wall.range_m > self.turning.longest_m;
             let is_hidden = self.turning.is_hidden() && (self.hidden)(ping.angle_rad);

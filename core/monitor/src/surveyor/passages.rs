@@ -6,8 +6,8 @@ use crate::resources::Coverage;
 use headrace_coverage::{Drive, HeadReach, Loss, PassError, Visit};
 use headrace_geometry::tunnel::Profile;
 
-/// A ping is no evidence of the speed if this many standard deviations of its error relative to the previous
-/// pass reach the target.
+/// Limit for using a ping's speed as evidence. The ping isn't used if this many standard deviations of its
+/// position error relative to the previous pass reach the target.
 const ADRIFT_SD: f64 = 2.0;
 
 /// Adds a ping to the passage of the section that the ping's head is in.
@@ -100,7 +100,7 @@ mod tests {
     /// A ping is no evidence of the speed if two standard deviations against the previous pass reach the
     /// target. The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn ping_with_an_uncertain_position_does_not_count_for_the_speed() {
+    fn ping_with_an_uncertain_position_is_no_evidence_of_the_speed() {
         let profile = pipe();
         let noted = |sd_m: f64| {
             let mut coverage = coverage();

@@ -15,7 +15,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Time that a pilot needs to slow down before the vehicle reaches wall that hasn't passed, seconds.
+/// Time that a pilot needs to slow down before the vehicle reaches wall without the verdict pass, seconds.
 const SOON_S: f64 = 5.0;
 /// Speed at or below which the vehicle counts as going back, m/s.
 const ASTERN_MPS: f64 = -0.02;
@@ -85,7 +85,8 @@ fn active(
     active
 }
 
-/// Whether all wall that the heads see now and in the next seconds has passed, so that any speed is fine.
+/// Whether all wall that the heads see now and in the next seconds has the verdict pass, so that any speed is
+/// fine.
 fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) -> bool {
     let Coverage { sections, .. } = coverage;
     let reaches = heads.iter().map(|(.., frontier)| frontier.0.map(|reach| reach.latest()));
@@ -167,7 +168,7 @@ mod tests {
     /// At 0.4 m/s, 2 m are covered in five seconds. The checked wall extends from a quarter of a metre behind
     /// the rear head to a quarter of a metre ahead of the front head's future place.
     #[test]
-    fn condition_is_passed_only_if_visible_and_upcoming_wall_has_passed() {
+    fn condition_is_passed_only_if_all_wall_in_view_and_ahead_has_the_verdict_pass() {
         let passed = |between: core::ops::Range<i64>, speed_mps: f64, x_m: Option<f64>| {
             let mut coverage = coverage();
             for index in between {

@@ -1,4 +1,4 @@
-//! Returns classified as wall become samples, doubtful ones are counted and recorded.
+//! Turns returns classified as wall into samples. Counts and records doubtful returns.
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 use bevy_ecs::system::SystemState;
@@ -77,7 +77,7 @@ type End<'w, 's> = (
     Outputs<'w>,
 );
 
-/// Applies the returns that still wait at the end of a dive, when no more returns will come, as doubtful.
+/// At the end of a dive, applies the returns that still wait as doubtful, because no more returns will come.
 /// Allocates: outside a tick only.
 pub(super) fn end_returns(world: &mut World) {
     let mut state = SystemState::<End<'_, '_>>::new(world);
@@ -97,7 +97,7 @@ pub(super) fn end_returns(world: &mut World) {
     }
 }
 
-/// Applies a waiting return that has been classified, and then the pings since.
+/// Applies a waiting return that has been classified, and then the effects of the pings that followed it.
 fn settle(
     context: &mut WallContext<'_>,
     sweep: &mut HeadSweep,
@@ -274,7 +274,7 @@ mod tests {
     /// An isolated echo in front of the wall waits for the next return. Then it counts as missing, for holes
     /// and for causes.
     #[test]
-    fn isolated_echo_counts_as_a_missing_sample_at_its_aim() {
+    fn isolated_echo_counts_as_a_missing_sample_at_the_aimed_wall_point() {
         for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {
             let mut bench = Bench::new();
             assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_without_room_are_counted() {
+    fn samples_are_counted_if_the_store_has_no_room() {
         let mut bench = Bench::new();
         let perimeter_m = bench.tunnel.profile.perimeter_m();
         let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 32.0, cell_m: 0.25, capacity: 2 };
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn returns_beyond_the_tunnel_are_counted_with_their_largest_distance() {
+    fn returns_beyond_the_tunnel_are_counted_and_the_largest_distance_is_kept() {
         let mut bench = Bench::new();
         let mut note = |x_m: f64| {
             bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });

@@ -21,7 +21,7 @@ const HEADER: &str =
 // HEADRACE_RENEW_WORDS=1 cargo test -p headrace_tests --test page words
 ";
 
-/// All conditions, with any figures.
+/// One example of each condition, with arbitrary figures.
 const CONDITIONS: [Condition; 14] = [
     Condition::NoData,
     Condition::Old(DurNs(0)),

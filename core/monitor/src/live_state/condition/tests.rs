@@ -8,7 +8,7 @@ const fn at(seconds: u64) -> MonoNs {
     MonoNs(seconds * 1_000_000_000)
 }
 
-/// Advice with this reason, speed and forecast T.
+/// Advice with this reason, largest speed and forecast spacing T.
 fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
     let none = fixtures::advice(&fixtures::situation(None));
     Advice { reason, v_max_mps, predicted_t_m: Some(t_m), will_exceed: t_m > 0.5, ..none }
@@ -52,9 +52,9 @@ fn lamp_follows_the_ratio_of_speed_to_limit() {
     );
 }
 
-/// Over wall that has passed any speed is fine, unless the position is doubtful or there is no sonar.
+/// Over wall with the verdict pass any speed is fine, unless the position is doubtful or there is no sonar.
 #[test]
-fn any_speed_is_fine_over_passed_wall() {
+fn any_speed_is_fine_over_wall_with_the_verdict_pass() {
     let back = LiveState { passed: true, speed_mps: Some(-0.3), ..state() };
     assert_eq!((back.condition(), back.condition().lamp()), (Condition::Passed, Lamp::Green));
     let coarse = LiveState { advice: Some(advice(Reason::AngularStep, 0.0, 0.9)), ..back };
@@ -87,7 +87,7 @@ fn condition_is_turn_fails_only_while_the_forecast_exceeds_the_target() {
 }
 
 #[test]
-fn forecast_within_the_position_error_of_the_target_is_not_good() {
+fn condition_is_not_good_if_the_forecast_may_exceed_the_target() {
     let forecast = |may_exceed, will_exceed| Advice {
         may_exceed,
         will_exceed,
@@ -138,7 +138,7 @@ fn state_becomes_stale_as_ticks_continue_without_data() {
 }
 
 #[test]
-fn sensor_is_ok_stalled_or_silent_by_its_readings() {
+fn readings_decide_whether_a_sensor_is_ok_stalled_or_silent() {
     let mut state = state();
     state.heard[2] = None;
     state.turning = 0b01;

@@ -95,7 +95,7 @@ fn all_of(causes: &[Cause]) -> Causes {
 
 /// At angles assumed to be hidden, losses are due to occlusion, unless other pings there do detect the wall.
 #[test]
-fn loss_at_hidden_angle_is_a_missing_return_once_other_pings_return() {
+fn loss_at_an_occluded_angle_is_a_missing_return_once_other_pings_there_detect_wall() {
     let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
     let aim = Some(Aim { x_m: 3.0, arc_m: 2.0 });
     let lost = |loss: Loss| away(5, Outcome::Lost(loss, aim));
@@ -123,7 +123,7 @@ fn loss_at_hidden_angle_is_a_missing_return_once_other_pings_return() {
 /// The head looks to the left, at wall 3 m away, and the vehicle is turned to the left by 0.1 rad. The beam
 /// then meets the wall 3 tan 0.1 m astern.
 #[test]
-fn lost_ping_is_a_missing_sample_at_its_aim_with_all_causes() {
+fn lost_ping_is_recorded_with_its_causes_at_the_aimed_wall_point() {
     let profile = pipe();
     let [y_m, z_m] = profile.reference();
     let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.1);
