@@ -42,7 +42,7 @@ pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,
     pub(crate) effect: &'static str,
-    /// Sources for which random numbers were drawn. Each one has the name of the effect that drew them.
+    /// Effects that drew random numbers before the dive, each with the source for which it drew them.
     pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
 }
 
@@ -171,7 +171,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Whether any effect replaces a base system.
+    /// Whether any effect replaces the base system named `base`.
     pub(crate) fn replaced(&self, base: &str) -> bool {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }

@@ -1,6 +1,6 @@
 //! Counter-based random numbers: each effect has its own counter for each source and step.
 //!
-//! A new effect or sensor therefore leaves the draws of all other effects unchanged.
+//! A new effect or sensor therefore leaves the random numbers of all other effects unchanged.
 //!
 //! Source: Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011 (Philox4x32-10); Wichura, "Algorithm
 //! AS 241", Applied Statistics 37, 1988 (normal quantiles).

@@ -15,8 +15,8 @@ use crate::sensing::Mounted;
 /// A sensor's true mount differs from the mount in the vehicle file. The loop uses the vehicle file.
 ///
 /// `position_m` and `angles_deg` (roll, pitch and yaw, applied before the file's angles) are added to the mounts of all
-/// named sensors. `position_sd_m`, to 1, and `angles_sd_deg`, to 30, are the standard deviations of additional errors,
-/// which are drawn for each axis and sensor. When a head occludes others, its position is that of the file.
+/// named sensors. `position_sd_m`, up to 1, and `angles_sd_deg`, up to 30, are the standard deviations of additional
+/// errors, which are drawn for each axis and sensor. When a head occludes others, its position is that of the file.
 pub(super) struct MountErrorKind;
 
 #[derive(Debug, Clone, Copy)]

@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbour_hides_twice_the_arcsine_of_radius_over_distance() {
+    fn neighbour_hides_an_angle_of_two_asin_radius_over_distance() {
         let dive = side_by_side();
         let scene = dive.scene("").unwrap();
         let radius_m = scene.facts.sensors[1].head.unwrap().body.radius_m;

@@ -130,7 +130,7 @@ mod tests {
     /// Long after the previous reversal, the head moves at w (2 exp(-t / T) - 1) after a reversal of the command. The
     /// head itself therefore reverses T ln 2 later.
     #[test]
-    fn steps_are_short_at_reversals_and_whole_between() {
+    fn steps_are_short_at_reversals_and_full_elsewhere() {
         let (plain, slowed) = (pings(""), pings(KEYS));
         let step_rad = turned(&plain[0], &plain[1]).abs();
         let period_s = between_s(&plain[0], &plain[1]);

@@ -20,9 +20,9 @@ const STRETCH_M: f64 = 1.0;
 
 /// From time to time the cable slips over the counter's wheel. A slip changes the count permanently.
 ///
-/// The cable slips `per_100m` times per hundred metres of travel, forwards or back. The size of a slip is drawn evenly
-/// from `size_m = [least, most]` (0.05 to 0.3 by default), with either sign. Travel is the distance that the vehicle
-/// moves, summed from count to count.
+/// The cable slips `per_100m` times per hundred metres of travel, forwards or back. The size of a slip is uniformly
+/// distributed over `size_m = [least, most]` (0.05 to 0.3 by default), with either sign. Travel is the distance that
+/// the vehicle moves, summed from count to count.
 pub(super) struct TetherSlipKind;
 
 #[derive(Debug, Clone, Copy)]

@@ -239,8 +239,8 @@ fn random_drift_has_the_given_amplitude_and_spread() {
         products += offsets[0] * offsets[1] / f64::from(count);
     }
     for (variance, reach) in squares.into_iter().zip(reach) {
-        // The tolerance fits about 2,000 independent intervals. The variance is 151/315 of the variance of uniform
-        // random numbers.
+        // The tolerance is that of a variance from about 2,000 independent values. The variance is 151/315 of the
+        // variance of uniform random numbers.
         let wanted = reach * reach / 3.0 * 151.0 / 315.0;
         assert!((variance - wanted).abs() <= 0.1 * wanted, "{variance} {wanted}");
     }

@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn future_pings_continue_the_last_two() {
+    fn future_pings_are_extrapolated_from_the_last_two() {
         let mut pings = Pings::default();
         for k in 0..100 {
             pings.add(ping(20 * k, f64::from(i32::try_from(k).unwrap()) * 0.02));

@@ -16,7 +16,7 @@ pub(super) enum Shape {
     Trimmed(f64, f64),
 }
 
-/// A test of a point, given in the tunnel's frame and as chainage, y and z.
+/// A test whether a point is in an object. The point is given in the tunnel's frame, and as chainage, y and z.
 pub(super) type Test = Box<dyn Fn(V3, V3) -> bool>;
 
 pub(super) struct Oracle {
@@ -191,7 +191,8 @@ impl Oracle {
             let next = t + step;
             let p = ray.at(next);
             chart = self.chart(p, chart[0]);
-            // Far from the axis, the nearest point of the axis may jump.
+            // Far from the axis, the nearest point of the axis may jump between steps, so it is searched without an
+            // estimate.
             if chart[1].abs() > 8.0 && !self.axis.is_empty() {
                 chart = self.search(p);
             }
@@ -283,12 +284,12 @@ impl Oracle {
     }
 }
 
-/// A box with sides along the axes, about a point of a straight tunnel.
+/// Tests whether a point of a straight tunnel is in a box with sides along the axes.
 pub(super) fn upright(least: V3, most: V3) -> Test {
     Box::new(move |p, _| (0..3).all(|k| (least[k]..=most[k]).contains(&p[k])))
 }
 
-/// An ellipsoid with its axes along x, y and z.
+/// Tests whether a point is in an ellipsoid with its axes along x, y and z.
 pub(super) fn ellipsoid(centre: V3, half: V3) -> Test {
     Box::new(move |p, _| {
         (0..3).map(|k| (p[k] - centre[k]) * (p[k] - centre[k]) / half[k] / half[k]).sum::<f64>() < 1.0

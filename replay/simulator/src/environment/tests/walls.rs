@@ -130,7 +130,7 @@ fn combined_bends_stations_and_bulges_match_the_model() {
 }
 
 #[test]
-fn arc_length_is_on_the_design_profile_in_the_axis_chart() {
+fn arc_length_is_measured_on_the_design_profile_in_bends_too() {
     let design = shapes::ceran().unwrap();
     let environment =
         parse(&format!("{}[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4", bends()), &design);
