@@ -131,7 +131,7 @@ fn invalid_candump_line_loses_only_itself() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_read_as_candump_without_a_panic(
+    fn arbitrary_bytes_are_read_as_candump_without_a_panic(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..2000),
             "(\\([0-9.]{0,12}\\) can[0-9] [0-9A-F]{0,9}#[0-9A-FR_.]{0,18}\n?){0,40}".prop_map(String::into_bytes),

@@ -42,7 +42,7 @@ pub(super) fn unpack<R: Read + Seek>(
     }
     let mut reader = reader(|options| options.with_skip_start_magic(true).with_validate_chunk_crcs(true));
     if let Err(error) = reader.add_decompressor(Unzstd::default()) {
-        // This can't happen, because the decompressor has a name.
+        // The only possible error is a decompressor without a name, and this one has a name.
         tracing::error!(%error, "chunks packed by zstd can't be read");
     }
     // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum would then

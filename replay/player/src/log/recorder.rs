@@ -270,7 +270,8 @@ impl RecorderPort {
         Ok(())
     }
 
-    /// Ends a stretch of skipped ticks. If there is no room to state it, it is stated together with the next stretch.
+    /// Ends a stretch of skipped ticks. If there is no room to record the stretch, it is recorded together with the
+    /// next one.
     fn end_gap(&mut self) {
         if let Some(gap) = self.gap.take() {
             self.gap = self.state.gaps.push(gap).err();
@@ -280,7 +281,7 @@ impl RecorderPort {
         }
     }
 
-    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, they are stated first.
+    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, the log gets their entry first.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         if Self::entry_bytes(len) <= self.vacant_bytes() {
             self.end_gap();

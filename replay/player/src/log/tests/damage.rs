@@ -403,7 +403,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_read_as_a_log_without_a_panic(
+    fn arbitrary_bytes_are_read_as_a_log_without_a_panic(
         start in prop::sample::select(vec![&b""[..], &b"\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"[..]]),
         bytes: Vec<u8>,
         records in prop::collection::vec((0_u8..17, 0_u64..80, prop::collection::vec(any::<u8>(), 0..80)), 0..20),

@@ -280,7 +280,7 @@ fn within(
 }
 
 #[test]
-fn filling_disk_keeps_small_messages_and_states_omissions() {
+fn filling_disk_keeps_small_messages_and_records_omissions() {
     let (medium, flushed) = slow(0);
     let mut header = header(true);
     header.results.push(ResultChannel {
@@ -359,7 +359,7 @@ fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
 }
 
 #[test]
-fn packets_dropped_by_lines_are_stated_per_source_every_few_seconds() {
+fn packets_dropped_by_lines_are_recorded_per_source_every_few_seconds() {
     let s = Duration::from_secs;
     let words = |packets: u64, id: &str, from: u64, to: u64| {
         format!(
@@ -465,7 +465,7 @@ fn recorder_ends_despite_a_blocked_medium() {
 }
 
 #[test]
-fn skipped_ticks_are_stated_in_the_log() {
+fn skipped_ticks_are_recorded_in_the_log() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let second = |seconds: u64| MonoNs(seconds * 1_000_000_000);
