@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_differ_by_seed_effect_source_step_and_block() {
+    fn random_numbers_differ_by_seed_effect_source_step_and_block() {
         let here = Stream::new(1, "a", "b").at(5);
         let others = [
             Stream::new(2, "a", "b").at(5),

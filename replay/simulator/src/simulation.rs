@@ -186,7 +186,7 @@ impl Simulation {
         Some(message)
     }
 
-    /// The next message, which stays in the simulation.
+    /// Returns the next message without removing it.
     pub fn peek_message(&mut self) -> Option<Message<'_>> {
         self.come().then(|| self.outbox.peek()).flatten()
     }

@@ -119,7 +119,7 @@ mod tests {
 
     /// White noise with density N has an Allan deviation of N / sqrt(t) for means over any time t.
     #[test]
-    fn rate_and_force_noise_have_the_given_densities_over_any_time() {
+    fn rate_and_force_noise_have_the_given_densities_for_any_averaging_time() {
         let (plain, noisy) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let period_s = plain[0].period.as_secs_f64();
         let parts = |f: fn(&Inertia) -> [f64; 3]| -> Vec<[f64; 3]> {

@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn sector_is_kept_and_starts_elsewhere() {
+    fn phase_error_shifts_the_start_within_an_unchanged_sector() {
         let program = HeadProgram { start_rad: 1.0, growing: true, sector: Some((1.0, 2.0)) };
         let begun = |off_deg: f64| {
             let HeadProgram { start_rad, growing, sector } = begun_off(program, off_deg.to_radians());
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn drawn_angles_follow_their_distribution() {
+    fn random_start_angles_follow_their_distribution() {
         let count = 20_000_u64;
         let angles = |offset: Offset| {
             let draw = |seed| offset.rad(0, Stream::new(seed, "start_phase_error", "head"));

@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn travel_back_counts_like_travel_forward() {
+    fn cable_slips_equally_on_the_way_forward_and_back() {
         let ahead = slips((0..40_000).map(|k| f64::from(k) * 0.125));
         let back_and_forth = slips(
             (0..40_000).map(|k| f64::from(if k / 800 % 2 == 0 { k % 800 } else { 800 - k % 800 }) * 0.125),

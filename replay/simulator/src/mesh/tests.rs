@@ -278,7 +278,7 @@ fn degenerate_triangles_leak_no_rays_and_keep_ranges_exact() {
 }
 
 #[test]
-fn first_face_wins_at_equal_ranges() {
+fn lowest_face_number_wins_at_equal_ranges() {
     let triangles = cuboid([1.0, 2.0, 3.0]);
     let hit = |t: &Triangles, direction| {
         Mesh::new(t.clone(), Role::Body).unwrap().cast([0.0; 3], direction, 9.0).unwrap()
@@ -295,7 +295,7 @@ fn first_face_wins_at_equal_ranges() {
 }
 
 #[test]
-fn ranges_are_bit_identical_for_any_order_of_faces() {
+fn ranges_are_bit_identical_whatever_the_order_of_faces() {
     let triangles = rough_body();
     let mut shuffled = triangles.clone();
     let mut random = Random(8);

@@ -75,7 +75,7 @@ const PILOT: &str = "kind = \"pilot\"\nplace_m = [0, 5]\nstart_m = 3\nspeed_mps 
                      backs_per_hour = 90\nwander_yaw_deg = 8\nwander_s = 10\n";
 
 #[test]
-fn pilot_reaches_the_end_within_bounds_both_ways() {
+fn pilot_reaches_the_end_within_bounds_in_both_directions() {
     for (from_m, to_m) in [(3.0, 60.0), (3.0, -15.0)] {
         for seed in 0..20 {
             let (trajectory, ground) = parsed(&format!("{PILOT}to_m = {to_m}\n"), seed).unwrap();

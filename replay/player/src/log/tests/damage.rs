@@ -323,7 +323,7 @@ fn damaged_attachment_is_reported_by_name() {
 }
 
 #[test]
-fn files_other_than_mcap_are_refused_with_their_first_bytes() {
+fn error_for_a_file_other_than_mcap_shows_its_first_bytes() {
     let error = |bytes: &[u8]| {
         LogReader::new(Cursor::new(bytes.to_vec()), "dive.mcap".to_owned()).err().unwrap().to_string()
     };

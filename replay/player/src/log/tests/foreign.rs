@@ -194,7 +194,7 @@ fn wrong_message_length_loses_at_most_two_messages() {
 }
 
 #[test]
-fn loss_up_to_the_closing_bytes_is_reported() {
+fn loss_of_all_records_before_the_closing_bytes_is_reported() {
     let chunked = WriteOptions::new().chunk_size(Some(200)).compression(None);
     for (options, opcode) in [(chunked, op::CHUNK), (WriteOptions::new().use_chunks(false), op::MESSAGE)] {
         let whole = write(options);

@@ -108,7 +108,7 @@ fn gate_has_slots_and_a_closed_gate_has_a_bulkhead() {
 }
 
 #[test]
-fn fall_leaves_a_cavity_and_a_heap() {
+fn rock_fall_leaves_a_cavity_and_a_heap() {
     let keys = "chainage_m = 20\nlength_m = 6\nwidth_m = 5\ndepth_m = 2\npieces = 40\nseed = 7";
     let text = feature("fall", keys)
         + &feature("debris", "chainage_m = 30\nlength_m = 4\nheight_m = 0.7\nname = \"spoil\"");

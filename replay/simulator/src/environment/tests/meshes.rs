@@ -268,7 +268,7 @@ fn refused(text: &str, files: &[(&str, &str)], words: &[&str]) {
 }
 
 #[test]
-fn invalid_mesh_files_are_refused_with_their_location() {
+fn error_for_an_invalid_mesh_names_scene_line_and_place() {
     let good = cuboid([0.5; 3]);
     let keys = table("chainage_m = 20\nfile = \"box.ply\"");
     let place = "s.toml:4: tunnel.features[0].file = \"box.ply\": ";
