@@ -14,7 +14,7 @@ use crate::random::Stream;
 use crate::sensing::{Mounted, Scenery};
 use crate::stages::Stage;
 
-/// Additions of one effect to a simulation, for display.
+/// Systems, components and random streams that one effect adds to a simulation, for display.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Added {
     /// Name of the effect in scenes.

@@ -103,11 +103,11 @@ pub(crate) struct Note {
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Notes(pub(crate) Vec<Note>);
 
-/// Copy of the measurements after the previous system.
+/// Copy of the measurements as the previous system left them.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Before<M: Measurement>(Vec<M>);
 
-/// Copy of the line after the previous system.
+/// Copy of the line's messages as the previous system left them.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct LineBefore(Line);
 

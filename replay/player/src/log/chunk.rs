@@ -23,7 +23,7 @@ const READ_BYTES: usize = 1 << 20;
 pub(super) enum Unpacked {
     /// The whole chunk is valid.
     Whole,
-    /// The file ends within the chunk. The records before the end parse, but no checksum covers them.
+    /// The file ends within the chunk. The records before the end can be parsed, but no checksum covers them.
     Cut,
     /// The chunk is damaged, and none of its records can be trusted.
     Bad(LossKind),

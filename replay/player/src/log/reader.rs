@@ -396,7 +396,7 @@ impl<R: Read + Seek> LogReader<R> {
         Ok(())
     }
 
-    /// Sets the times of a piece, and keeps those that its header states.
+    /// Sets the times of a piece. The times that its header states are stored separately.
     fn correct(&mut self, number: usize, times: (u64, u64)) {
         let Some(span) = self.spans.get_mut(number).filter(|span| (span.from, span.to) != times) else {
             return;

@@ -18,7 +18,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Length of a time span, s. A span contains at most one bump.
+/// Length of the time spans into which a dive is divided, s. Each contains at most one bump.
 const SPAN_S: f64 = 1.0;
 
 /// From time to time the vehicle bumps into the wall, a rock or its own cable. It is pushed one way and swings back.

@@ -186,7 +186,7 @@ mod tests {
         assert!(with.iter().all(|range_m| range_m.unwrap() <= wall_m));
         let nearer = with.iter().filter(|range_m| range_m.unwrap() < wall_m).count();
         // The pings of a run hit the same cluster. A run has 1 / (1 - share) pings on average, which increases the
-        // spread.
+        // standard deviation of the count.
         let share = 0.4 * (wall_m - 2.0) / 2.0;
         let sd = math::sqrt(share * (1.0 - share) / base.len() as f64 * 2.0 / (1.0 - 0.4));
         assert!((nearer as f64 / base.len() as f64 - share).abs() < 5.0 * sd, "{nearer} of {}", base.len());

@@ -15,7 +15,7 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of a stretch of travel, m. The cable slips at most once in each stretch.
+/// Length of the stretches into which the travel is divided, m. The cable slips at most once in each stretch.
 const STRETCH_M: f64 = 1.0;
 
 /// From time to time the cable slips over the counter's wheel. A slip changes the count permanently.

@@ -339,7 +339,7 @@ fn messages_beyond_the_queue_capacity_are_counted() {
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }
 
-/// Runs the recorder at the given times, with packets dropped before each. Returns the statements in the log.
+/// Runs the recorder at the given times, with packets dropped before each. Returns the losses that the log states.
 fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
     let (medium, flushed) = slow(0);
     let storage = Box::new(Within(None, Some(medium)));
