@@ -44,7 +44,8 @@ fn taker(source: u16, stream: &str) -> Taker {
     Taker { source, stream: stream.to_owned(), driver: None }
 }
 
-/// Imports a file. Returns the result, and for each message its source, ms after the beginning and last byte.
+/// Imports a file. Returns the result, and for each message its source, its time in ms after the beginning, and its
+/// last byte.
 fn imported(file: &[u8]) -> (Imported, Vec<(u16, i64, u8)>) {
     let import = open(file, Box::new(Eights)).unwrap();
     let path = std::env::temp_dir().join(format!(

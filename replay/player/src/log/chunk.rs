@@ -1,4 +1,4 @@
-//! Unpacks chunks, and verifies the checksums of larger parts of a file, with the `mcap` crate's reader.
+//! Uses the `mcap` crate's reader to unpack chunks, and to verify the checksums of larger parts of a file.
 //!
 //! The decompressor of zstd works like that crate's, but limits the window, which a frame may otherwise set to 128 MiB.
 //! Formats of zstd before 0.8 have windows of another kind, and aren't supported.
@@ -88,7 +88,7 @@ pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Resul
     Ok(!matches!(result, Err(McapError::BadDataCrc { .. })))
 }
 
-/// Whether the summary parses and matches its checksum, if it has one. It begins after the data end record at
+/// Whether the summary can be parsed and matches its checksum, if it has one. It begins after the data end record at
 /// `data_end`.
 pub(super) fn summary_holds<R: Read + Seek>(file: &mut LogFile<R>, data_end: u64) -> Result<bool, LogError> {
     let reader =

@@ -257,7 +257,8 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
 
 /// Identifies a record by its content, for a record whose opcode is damaged.
 fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
-    // A message may contain any bytes. But bytes that parse as a chunk with matching lengths are no coincidence.
+    // A message may contain any bytes. But bytes that can be parsed as a chunk with matching lengths are no
+    // coincidence.
     let kinds: &[u8] =
         if opcode == op::MESSAGE { &[op::CHUNK] } else { &[op::CHUNK, op::ATTACHMENT, op::METADATA] };
     kinds

@@ -175,7 +175,7 @@ fn run(mut worker: RecorderWorker) -> Summary {
 }
 
 impl RecorderPort {
-    /// Records bytes from `source`, received at `received` and valid for `valid`.
+    /// Records bytes from `source`, received at `received` and valid at `valid`.
     ///
     /// Errors: there is no room; nothing was written.
     pub fn raw(&mut self, source: u16, received: MonoNs, valid: MonoNs, bytes: &[u8]) -> Result<(), Full> {
@@ -217,7 +217,7 @@ impl RecorderPort {
 
     /// Skips a tick of `packets` packets for which there is no room.
     ///
-    /// The log states the skipped ticks. The first one is also reported as an event.
+    /// The log records the skipped ticks. The first one is also reported as an event.
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
         self.state.hand(at);
         if self.gap.is_none() {

@@ -389,7 +389,7 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
-    /// Writes a statement of a loss between `from` and `to`; `None` if a time is unknown. Closes the chunk.
+    /// Records a loss between `from` and `to` in the log; `None` if a time is unknown. Closes the chunk.
     ///
     /// Errors: an error of the writer.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {

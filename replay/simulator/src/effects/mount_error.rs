@@ -138,8 +138,8 @@ mod tests {
         assert!(pairs.abs() < 5e-4 / math::sqrt(n / 2.0), "{pairs}");
     }
 
-    /// Roll turns a beam that is perpendicular to the head's axis within its plane. Pitch and yaw turn it out of the
-    /// plane.
+    /// A beam is perpendicular to the head's axis. Roll turns the beam within its plane of turning; pitch and yaw turn
+    /// it out of this plane.
     #[test]
     fn mount_angle_errors_have_the_given_spread_about_each_axis() {
         let sd_rad = f64::to_radians(0.5);

@@ -173,8 +173,8 @@ mod tests {
             let incidence_rad = math::asin(out_m * ray.direction.z().abs() / radius_m);
             let chord_m = 2.0 * radius_m * math::cos(incidence_rad);
             let first_m = radius_m * math::cos(incidence_rad) - out_m * ray.direction.y();
-            // The path from the second point back to the sonar follows from the law of cosines, with twice the
-            // incidence between beam and chord.
+            // The path from the second point back to the sonar follows from the law of cosines. The angle between beam
+            // and chord is twice the incidence.
             let cosine = math::cos(2.0 * incidence_rad);
             let back_m = math::sqrt(first_m * first_m + chord_m * chord_m - 2.0 * first_m * chord_m * cosine);
             let found_m = double_bounce_m(&pipe, &ray, 100.0).unwrap();

@@ -372,8 +372,8 @@ impl Tube {
         distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
     }
 
-    /// The profile's wall in the direction of an unscaled point from the reference point, and the distance from there
-    /// to the point, m.
+    /// The profile's wall in the direction from the reference point to an unscaled point, and the distance between
+    /// these two points, m.
     fn outwards(&self, unscaled: Yz) -> Option<(headrace_geometry::tunnel::WallHit, f64)> {
         let [ry, rz] = self.profile.reference();
         let out = [unscaled[0] - ry, unscaled[1] - rz];
@@ -383,8 +383,8 @@ impl Tube {
 
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     fn unscaled(&self, section: Yz, scale: f64) -> Yz {
-        // Without this return, adding and subtracting the floor's position could cost a bit. The plain case must equal
-        // the profile exactly.
+        // Without this return, adding and subtracting the floor's position could change the last bit. The plain case
+        // must equal the profile exactly.
         if scale == 1.0 {
             return section;
         }

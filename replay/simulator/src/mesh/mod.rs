@@ -97,8 +97,8 @@ impl Mesh {
     /// if there is no hit, or if a number other than `far_m` is not finite.
     pub fn cast(&self, origin: [f64; 3], direction_unit: [f64; 3], far_m: f64) -> Option<MeshHit> {
         let ray = Ray::new(origin, direction_unit, far_m);
-        // The face with the smallest number among hits at equal ranges. The tree itself returns the hit that it visits
-        // first.
+        // Range and face of the best hit. The smallest face number wins at equal ranges, while the tree itself would
+        // return the hit that it visits first.
         let best: Cell<Option<(f64, u32)>> = Cell::new(None);
         self.tree.find_best(
             f64::MAX,

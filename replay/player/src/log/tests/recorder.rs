@@ -288,7 +288,7 @@ fn filling_disk_keeps_small_messages_and_records_omissions() {
         follows_echoes: true,
         ..ResultChannel::default()
     });
-    // Only source 0 is a sonar. The packets of source 2 are as long as echoes, as the lines of a velocity log are.
+    // Only source 0 is a sonar. The packets of source 2 are as long as echoes, like the lines of a velocity log.
     header.sonars = vec![0];
     let (mut port, handle) = within(Some(5_000_000), medium, &header, None);
     for tick in 1..=100_u64 {

@@ -16,7 +16,8 @@ pub(super) enum Shape {
     Trimmed(f64, f64),
 }
 
-/// A test whether a point is in an object. The point is given in the tunnel's frame, and as chainage, y and z.
+/// A function that tests whether a point is in an object. The point is given in the tunnel's frame, and as chainage, y
+/// and z.
 pub(super) type Test = Box<dyn Fn(V3, V3) -> bool>;
 
 pub(super) struct Oracle {
