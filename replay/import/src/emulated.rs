@@ -10,7 +10,7 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, So
 use headrace_sensor::reading::Level;
 use headrace_vehicle::VehicleConfig;
 
-/// Sample period that inertial samples state. The foreign values don't state theirs.
+/// Sample period that emulated inertial samples report, since foreign logs don't give one.
 const PERIOD: DurNs = DurNs(10_000_000);
 
 /// A value for an emulator.

@@ -1,6 +1,6 @@
 //! Entries of a foreign log, and results of parsing it.
 
-/// Bytes that a foreign log recorded on one line.
+/// Bytes that a foreign log recorded on one line, at one time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
     /// Timestamp, nanoseconds on the file's clock.

@@ -1,4 +1,5 @@
-//! Assigns lines of a foreign log to the sensors that receive them.
+//! Assigns the lines of a foreign log to sensors. A line is a connection whose data was recorded, such as a CAN
+//! interface.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_replay::log::SourceInfo;
@@ -11,7 +12,7 @@ use crate::kind::FileKind;
 pub struct Taker {
     /// Source number of the sensor in the log.
     pub source: u16,
-    /// Name of the line that the sensor receives.
+    /// Name of the line in the file whose data the sensor receives.
     pub stream: String,
     /// Driver that picks the sensor's data from a shared line. Without a driver, the sensor gets everything on the
     /// line.
@@ -32,7 +33,7 @@ impl Wire for Heard {
 }
 
 impl Taker {
-    /// Whether the sensor receives this line.
+    /// Whether the sensor receives the data of this line.
     pub(super) fn listens_to(&self, stream: &str) -> bool {
         self.stream == stream
     }

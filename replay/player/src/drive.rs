@@ -100,7 +100,7 @@ pub fn drive(
     feed::drive(dive, &mut PacedFeed { driver, source, pace, clock: None }, after_tick)
 }
 
-/// A packet source with a pace, as the feed of a loop.
+/// Feeds a loop from a packet source, at a given pace.
 struct PacedFeed<'a> {
     driver: Driver,
     source: &'a mut dyn PacketSource,
@@ -179,7 +179,7 @@ impl Driver {
         Ok(())
     }
 
-    /// Feeds packets received before `until`. `work_off` runs a tick.
+    /// Feeds packets received before `until`. Calls `work_off`, which runs a tick, whenever a ring is full.
     ///
     /// After an error, the packets fed so far have been processed.
     pub(crate) fn fill(
@@ -244,7 +244,7 @@ pub(crate) struct Clock {
 impl Clock {
     /// Starts the clock: packet time is now `origin`, and advances by `speed` seconds per second of wall time.
     ///
-    /// With `None` for `speed` nothing waits.
+    /// If `speed` is `None`, the clock never waits.
     #[expect(clippy::disallowed_methods, reason = "pacing is for people who watch; no result depends on it")]
     pub(crate) fn start(origin: MonoNs, speed: Option<f64>) -> Self {
         Self { origin, paced: speed.map(|speed| (Instant::now(), speed)) }

@@ -83,7 +83,7 @@ impl LeftOut {
         self.excess() <= 1.0
     }
 
-    /// Returns the largest change within the confidence intervals, in units of the limits.
+    /// Returns the largest change within the confidence intervals, as a multiple of its limit.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }

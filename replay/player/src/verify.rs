@@ -104,7 +104,7 @@ impl Batch {
 }
 
 impl Stream {
-    /// Returns the live record with the replay's next number, if it is at the front of the queue.
+    /// Returns the live record with the number of the replay's next record, if it is at the front of the queue.
     fn front(&self) -> Option<(u64, Record<'_>)> {
         let batch = self.waiting.front().filter(|batch| batch.next == self.next)?;
         first_record(batch.rest()).map(|(record, _)| (batch.tick, record))

@@ -14,7 +14,7 @@ use crate::random::Stream;
 use crate::sensing::{Mounted, Scenery};
 use crate::stages::Stage;
 
-/// Additions of one effect to a simulation, for display.
+/// Systems, components and random streams that one effect adds to a simulation, for display.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Added {
     /// Name of the effect in scenes.
@@ -42,7 +42,7 @@ pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,
     pub(crate) effect: &'static str,
-    /// Sources for which random numbers were drawn. Each one has the name of the effect that drew them.
+    /// Effects that drew random numbers before the dive, each with the source for which it drew them.
     pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
 }
 
@@ -171,7 +171,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Whether any effect replaces a base system.
+    /// Whether any effect replaces the base system named `base`.
     pub(crate) fn replaced(&self, base: &str) -> bool {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }

@@ -103,11 +103,11 @@ pub(crate) struct Note {
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Notes(pub(crate) Vec<Note>);
 
-/// Copy of the measurements after the previous system.
+/// Copy of the measurements as the previous system left them.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Before<M: Measurement>(Vec<M>);
 
-/// Copy of the line after the previous system.
+/// Copy of the line's messages as the previous system left them.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct LineBefore(Line);
 
@@ -117,7 +117,7 @@ impl<M: Measurement> Default for Before<M> {
     }
 }
 
-/// The effect with the system that has just run; `None` for a base system, since its output is the original
+/// The effect to which the system that has just run belongs; `None` for a base system, whose output is the original
 /// measurement.
 #[derive(Debug, Clone, Copy)]
 struct After(Option<u16>);
@@ -126,7 +126,7 @@ type Noted<'a, M> = (&'a Source, &'a Samples<M>, &'a mut Before<M>);
 
 type AllNoted<'w, 's, M> = Query<'w, 's, Noted<'static, M>>;
 
-/// Returns a system that records the changes since the previous such system as changes by `effect`.
+/// Returns a system that records all changes since the last such system ran, and attributes them to `effect`.
 #[expect(clippy::type_complexity, reason = "a system's signature is what it needs")]
 pub(crate) fn note(
     effect: Option<u16>,

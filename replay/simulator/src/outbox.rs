@@ -29,7 +29,7 @@ pub(crate) struct Outbox {
     lanes: Vec<Lane>,
     /// Time at which the next message of each lane is due; `NEVER` if the lane is empty.
     due: Vec<MonoNs>,
-    /// Time before which messages are released.
+    /// Messages with timestamps before this time are released.
     until: MonoNs,
     /// The lane with the next released message.
     front: Option<usize>,

@@ -80,8 +80,8 @@ fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, Sce
     Ok(navigation)
 }
 
-/// Largest standard deviation of the size of a hole between two passes, around the wall, for each time between the
-/// passes.
+/// Pairs of the time between two passes, s, and the standard deviation of the size of a hole between these passes, m.
+/// The standard deviation is the largest around the wall.
 fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig) -> Vec<[f64; 2]> {
     let Some(running) = navigation.running() else { return Vec::new() };
     let profile = &vehicle.tunnel.profile;

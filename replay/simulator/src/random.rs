@@ -1,6 +1,6 @@
 //! Counter-based random numbers: each effect has its own counter for each source and step.
 //!
-//! A new effect or sensor therefore leaves the draws of all other effects unchanged.
+//! A new effect or sensor therefore leaves the random numbers of all other effects unchanged.
 //!
 //! Source: Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011 (Philox4x32-10); Wichura, "Algorithm
 //! AS 241", Applied Statistics 37, 1988 (normal quantiles).
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_differ_by_seed_effect_source_step_and_block() {
+    fn random_numbers_differ_by_seed_effect_source_step_and_block() {
         let here = Stream::new(1, "a", "b").at(5);
         let others = [
             Stream::new(2, "a", "b").at(5),

@@ -64,7 +64,8 @@ pub(crate) struct Echosounder;
 /// Measurements in the slice, in order of time.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Samples<M: Measurement> {
-    /// Number of the first sample, counted from the start of the dive. It is the step for the random draws of effects.
+    /// Number of the first sample, counted from the start of the dive. It is the step for the random numbers of
+    /// effects.
     pub first: u64,
     /// The measurements.
     pub list: Vec<M>,
@@ -85,7 +86,7 @@ pub(crate) struct Ray {
     pub hit: Option<Hit>,
 }
 
-/// Range of the sonar at its setting plus a margin, m.
+/// Distance up to which the walls ahead of a sonar are computed: its range setting and a margin, m.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Reach(pub f64);
 

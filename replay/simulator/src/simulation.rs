@@ -28,7 +28,8 @@ use crate::truth::{self, TruthRow};
 
 /// Length of a slice. At this length, the overhead of the schedule is negligible.
 const SLICE: DurNs = DurNs(1_000_000_000);
-/// Ratio of the distance up to which walls are computed to a sonar's range. It allows for effects that shorten ranges.
+/// Distance up to which walls are computed, as a multiple of a sonar's range. The margin allows for effects that
+/// shorten ranges.
 const REACH_SHARE: f64 = 1.25;
 /// Range of an echosounder, m.
 const ECHOSOUNDER_REACH_M: f64 = 100.0;
@@ -185,7 +186,7 @@ impl Simulation {
         Some(message)
     }
 
-    /// The next message, which stays in the simulation.
+    /// Returns the next message without removing it.
     pub fn peek_message(&mut self) -> Option<Message<'_>> {
         self.come().then(|| self.outbox.peek()).flatten()
     }

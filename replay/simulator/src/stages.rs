@@ -154,7 +154,7 @@ pub(crate) fn aim_echosounders(
 
 type Looking<'a> = (&'a mut Samples<Sounding>, &'a mut Rays, &'a Reach);
 
-/// Marks beams with rays that are cast by an effect instead of the base system.
+/// Marks sonars whose rays are cast by an effect instead of the base system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct OwnBeam;
 

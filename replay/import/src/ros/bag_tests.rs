@@ -120,7 +120,7 @@ fn bag_cut_anywhere_delivers_messages_before_the_cut() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_read_as_a_bag_without_a_panic(
+    fn arbitrary_bytes_are_read_as_a_bag_without_a_panic(
         bytes in proptest::collection::vec(any::<u8>(), 0..600),
         at in 0_usize..400,
     ) {

@@ -1,7 +1,7 @@
 //! Converts scans and point clouds of a profiling head to beams: angle, range and time.
 //!
-//! A scan turns about its own z axis, counted from x towards y. This axis is the head's x. The scan's x is the head's
-//! zero angle (down, -z), and the scan's y is the head's y.
+//! The angles of a scan are about its own z axis, from x towards y. This axis is the head's x. The scan's x is the
+//! head's zero angle (down, -z), and the scan's y is the head's y.
 //!
 //! The points of a cloud are in the head's own frame, with the beam in the plane of y and z. With `xy` in the mapping
 //! they are in the frame of a scan.

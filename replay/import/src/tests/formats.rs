@@ -138,7 +138,7 @@ fn table_values_are_converted_to_wire_units() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_split_into_entries_or_lost(
+    fn arbitrary_bytes_are_split_into_entries_or_lost(
         bytes in proptest::collection::vec(any::<u8>(), 0..3000),
         which in 0_usize..3,
         at in 0_usize..400,
@@ -161,7 +161,7 @@ proptest! {
     }
 
     #[test]
-    fn any_table_is_read_to_its_end(
+    fn arbitrary_table_is_read_to_its_end(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..2000),
             "(-?[0-9e.]{0,22},[-0-9einaf.]{0,9},[0-9.]{0,3}\n?){0,40}".prop_map(String::into_bytes),

@@ -60,8 +60,8 @@ pub(super) struct Channels {
 impl Channels {
     /// Creates the channels, and numbers their sources.
     ///
-    /// The numbers come from the channels' metadata if these number all sources from 0, and otherwise from the order
-    /// of names.
+    /// The numbers are those in the channels' metadata, if every source has one and they count from 0. Otherwise the
+    /// sources are numbered in the order of their names.
     pub(super) fn new(definitions: BTreeMap<u16, Definition>, budget: HeaderBudget) -> Self {
         let mut definitions: Vec<Definition> = definitions.into_values().collect();
         let numbers: BTreeMap<&str, Option<u16>> =

@@ -59,7 +59,7 @@ pub enum RecordingEvent {
     },
     /// The recording continues.
     Resumed(RecordingFault),
-    /// The medium doesn't accept data, without an error. The queue is full, so new data isn't recorded.
+    /// The medium accepts no data, but reports no error. The queue is full, so new data isn't recorded.
     Behind,
     /// The medium accepts data again.
     CaughtUp {

@@ -249,7 +249,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_decode_to_a_tick_or_an_error(bytes: Vec<u8>) {
+        fn arbitrary_bytes_decode_to_a_tick_or_an_error(bytes: Vec<u8>) {
             if let Ok(tick) = Tick::decode(&bytes) {
                 prop_assert_eq!(TICK_HEAD_BYTES + 2 * tick.order().len(), bytes.len());
             }

@@ -24,7 +24,7 @@ use super::medium::Medium;
 const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Length of opcode and length field, bytes.
 const RECORD_HEAD_BYTES: usize = 9;
-/// Maximum number of bytes read to identify a record. They hold fields of fixed length, and names.
+/// Maximum number of bytes read to identify a record. Fields of fixed length and names fit into them.
 const GLANCE_BYTES: usize = 1024;
 /// Length of a chunk record before its data, without the name of the compression, bytes.
 const CHUNK_HEAD_BYTES: u64 = 40;
@@ -99,7 +99,7 @@ pub(super) struct Definition {
     pub(super) form: Option<(u16, String)>,
 }
 
-/// Compares the fields that the log's list of channels contains, so without `form`.
+/// Compares only the fields that the log's list of channels contains. `form` isn't among them.
 impl PartialEq for Definition {
     fn eq(&self, other: &Self) -> bool {
         (self.id, &self.topic, &self.metadata) == (other.id, &other.topic, &other.metadata)
@@ -257,7 +257,8 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
 
 /// Identifies a record by its content, for a record whose opcode is damaged.
 fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
-    // A message may contain any bytes. But bytes that parse as a chunk with matching lengths are no coincidence.
+    // A message may contain any bytes. But bytes that can be parsed as a chunk with matching lengths are no
+    // coincidence.
     let kinds: &[u8] =
         if opcode == op::MESSAGE { &[op::CHUNK] } else { &[op::CHUNK, op::ATTACHMENT, op::METADATA] };
     kinds
@@ -298,8 +299,8 @@ fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
 
 /// Identifies a chunk, which implies its length twice.
 ///
-/// If the two lengths differ, the length that another record follows is right. If both are the largest u64, the
-/// writer never closed the chunk.
+/// If the two lengths differ, the right length is the one after which another record begins. If both are the largest
+/// u64, the writer never closed the chunk.
 fn look_at_chunk<R: Read + Seek>(
     file: &mut LogFile<R>,
     mut frame: Frame,
@@ -336,7 +337,8 @@ fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool
     Ok(whole && opcode <= op::DATA_END && is_possible(opcode, len) && len <= file.len() - at)
 }
 
-/// Parses the fields that are needed of a record. Also returns the minimum record length that they imply.
+/// Parses those fields of a record that framing and scanning need. Also returns the minimum record length that they
+/// imply.
 fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     let mut fields = Fields::new(bytes);
     let item = match opcode {

@@ -73,7 +73,7 @@ impl HeaderBudget {
     }
 }
 
-/// Returns a text of the log for a quotation in a loss, shortened if too long.
+/// Returns a text from the log in the form in which a loss quotes it: shortened if it is too long.
 pub(super) fn quoted(text: &str) -> String {
     if text.len() <= MAX_QUOTED_BYTES {
         return text.to_owned();

@@ -52,8 +52,8 @@ impl Batch {
     }
 }
 
-/// Sort key of a message: time, rank and sequence number, then position in the file. In file order the first three are
-/// zero.
+/// Sort key of a message: time, rank and sequence number, then position in the file. If the log is read in file order,
+/// the first three are zero.
 type Key = (u64, u32, u32, usize, usize);
 
 /// Pieces in memory, whose messages are being merged.

@@ -37,8 +37,8 @@ pub struct LogInfo {
     pub metadata: BTreeMap<String, String>,
     /// The sources. A source's index is its number in [`MessageKind`].
     ///
-    /// The channels' metadata number the sources in this program's logs. If metadata don't number all of them, they
-    /// are numbered by name: `/raw/...` first, then `/sent/...`.
+    /// In this program's logs, the channels' metadata contain the numbers. If some are missing, the sources are
+    /// numbered by name: `/raw/...` first, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
     /// Position of this log in a recording with several parts.
     pub part: Option<Part>,
@@ -288,7 +288,8 @@ impl<R: Read + Seek> LogReader<R> {
         self.losses.list()
     }
 
-    /// Returns how many messages were delivered after a message with a later log time, in a log without ticks.
+    /// Returns the number of messages delivered out of order: after a message with a later log time. It is 0 for a log
+    /// with ticks.
     pub fn late(&self) -> u64 {
         self.late
     }
@@ -307,7 +308,7 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Returns the next message; `None` at the end.
     ///
-    /// Errors: an I/O error that doesn't concern certain bytes. Damage and unreadable bytes are losses, not errors.
+    /// Errors: an I/O error other than unreadable bytes. Damage and unreadable bytes are losses, not errors.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -396,7 +397,7 @@ impl<R: Read + Seek> LogReader<R> {
         Ok(())
     }
 
-    /// Sets the times of a piece, and keeps those that its header states.
+    /// Sets the times of a piece. The times that its header states are stored separately.
     fn correct(&mut self, number: usize, times: (u64, u64)) {
         let Some(span) = self.spans.get_mut(number).filter(|span| (span.from, span.to) != times) else {
             return;

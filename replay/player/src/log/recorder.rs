@@ -175,7 +175,7 @@ fn run(mut worker: RecorderWorker) -> Summary {
 }
 
 impl RecorderPort {
-    /// Records bytes from `source`, received at `received` and valid for `valid`.
+    /// Records bytes from `source`, received at `received` and valid at `valid`.
     ///
     /// Errors: there is no room; nothing was written.
     pub fn raw(&mut self, source: u16, received: MonoNs, valid: MonoNs, bytes: &[u8]) -> Result<(), Full> {
@@ -217,7 +217,7 @@ impl RecorderPort {
 
     /// Skips a tick of `packets` packets for which there is no room.
     ///
-    /// The log states the skipped ticks. The first one is also reported as an event.
+    /// The log records the skipped ticks. The first one is also reported as an event.
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
         self.state.hand(at);
         if self.gap.is_none() {
@@ -270,7 +270,8 @@ impl RecorderPort {
         Ok(())
     }
 
-    /// Ends a stretch of skipped ticks. If there is no room to state it, it is stated together with the next stretch.
+    /// Ends a stretch of skipped ticks. If there is no room to record the stretch, it is recorded together with the
+    /// next one.
     fn end_gap(&mut self) {
         if let Some(gap) = self.gap.take() {
             self.gap = self.state.gaps.push(gap).err();
@@ -280,7 +281,7 @@ impl RecorderPort {
         }
     }
 
-    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, they are stated first.
+    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, the log gets their entry first.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         if Self::entry_bytes(len) <= self.vacant_bytes() {
             self.end_gap();

@@ -22,14 +22,14 @@ pub struct Recovered {
     pub messages: u64,
     /// Log times of the first and last message written, in log order.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// Losses, which the recovered log states too.
+    /// Losses, which the recovered log lists too.
     pub losses: Vec<Loss>,
 }
 
 /// Writes the readable content of a log to `output`, in the same order.
 ///
 /// The content is attachments, metadata, device messages, ticks and results. The new log replays to the same digest,
-/// and states its losses. All parts of a recording become one log; a single part remains a part.
+/// and lists the losses. All parts of a recording become one log; a single part remains a part.
 ///
 /// `open` opens the log; it is called twice, first to find all damage. `known` are the result channels whose schemas
 /// this program has. `from` is the name of the original log.

@@ -263,7 +263,8 @@ impl Scan {
 
     fn add_chunk(&mut self, at: u64, end: u64, place: &ChunkPlace) {
         let (from, to) = place.times;
-        // Only chunks that will be unpacked as a whole count: not chunks over the limit, and not truncated chunks.
+        // A chunk is counted only if it will be unpacked completely. Chunks over the limit and truncated chunks are
+        // not.
         if !place.compression.is_empty() && !place.cut && place.unpacked_len <= MAX_UNPACKED_BYTES {
             let unpacked = self.unpacked.saturating_add(place.unpacked_len);
             if unpacked > unpacked_limit(end) {

@@ -31,7 +31,7 @@ pub struct LeftOut {
 }
 
 impl LeftOut {
-    /// Returns the text that states the dropped messages, without the times.
+    /// Returns the log's text about the dropped messages, without the times.
     pub fn words(&self) -> String {
         let Self { messages, bytes, .. } = self;
         format!(

@@ -85,7 +85,7 @@ pub(super) enum Taken {
 }
 
 impl Taken {
-    /// Whether an error reports a change by another program to the file.
+    /// Whether an error means that another program has changed the file.
     pub(super) fn is_in(error: &io::Error) -> bool {
         error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<Self>)
     }
@@ -158,7 +158,7 @@ fn links(_: &Metadata) -> u64 {
 /// Size of the write buffer, bytes.
 const BUFFER_BYTES: usize = 64 << 10;
 
-/// A stored file with a buffer, as a writer.
+/// Writes to a stored file through a buffer.
 ///
 /// Flushing writes the buffer and syncs the file. Dropping discards buffered bytes.
 pub(super) struct Buffered {

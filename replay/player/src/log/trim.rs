@@ -40,7 +40,8 @@ pub struct Trimmed {
     pub messages: u64,
     /// Number of messages dropped because they are outside the spans.
     pub cut: u64,
-    /// Number of result messages dropped. A trimmed dive would get other judgements, and some results name people.
+    /// Number of result messages dropped. They are dropped because a trimmed dive would get other judgements, and
+    /// because some results name people.
     pub results: u64,
     /// Number of source messages that were changed.
     pub changed: u64,

@@ -145,7 +145,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_decode_to_a_valid_voice_recording_or_an_error(bytes: Vec<u8>) {
+        fn arbitrary_bytes_decode_to_a_valid_voice_recording_or_an_error(bytes: Vec<u8>) {
             if let Ok(voice) = decode(&bytes) {
                 prop_assert_eq!(voice.checked().map(|voice| encode(&voice).len()), Ok(bytes.len()));
             }

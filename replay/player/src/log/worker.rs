@@ -18,7 +18,7 @@ use super::writer::{Lane, LogHeader, Summary};
 ///
 /// A power cut may cost a second. The interval is half of that, because closing and syncing take time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// Interval between statements about packets that lines dropped.
+/// Interval at which the log records packets that lines dropped.
 const DROPPED_PERIOD: Duration = Duration::from_secs(5);
 /// Maximum number of entries written in one step.
 const BATCH: usize = 256;
@@ -57,7 +57,8 @@ pub struct RecorderWorker {
     skipped: u64,
     /// Ids of the sources.
     ids: Vec<String>,
-    /// Packets dropped by lines since the last statement, by source. After it, the time of that statement.
+    /// Packets that lines dropped and that the log doesn't record yet, by source. The next field is the time of the
+    /// last record.
     dropped: BTreeMap<u16, Dropped>,
     dropped_stated: Duration,
     /// Log time of the last entry. A voice recording has no log time of its own, so it gets this one.
@@ -200,7 +201,7 @@ impl RecorderWorker {
         summary
     }
 
-    /// Writes statements of skipped ticks to the log.
+    /// Records skipped ticks in the log.
     fn state_gaps(&mut self) {
         while let Some(Gap { span: (from, to), packets }) = self.state.gaps.pop() {
             self.skipped += packets;
@@ -209,9 +210,9 @@ impl RecorderWorker {
         }
     }
 
-    /// Writes statements of packets that lines dropped, every few seconds and at the end.
+    /// Records in the log which packets the lines dropped, every few seconds and at the end.
     ///
-    /// The interval limits the number of statements if packets are dropped for hours.
+    /// The interval limits the number of records if packets are dropped for hours.
     fn state_dropped(&mut self, now: Duration, at_end: bool) {
         let dropped = core::iter::from_fn(|| self.state.dropped.pop());
         for Dropped { source, span: (from, to), packets } in dropped {

@@ -23,7 +23,7 @@ use super::{LeftOut, LogError, RecordingFault};
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Span of dive time at which a chunk is closed.
 const CHUNK_SPAN: DurNs = DurNs(500_000_000);
-/// Length of the summary for each chunk, and for each channel in a chunk, bytes.
+/// Bytes that each chunk adds to the summary, and bytes that each channel in a chunk adds.
 ///
 /// Source: MCAP format specification, "Chunk Index".
 const CHUNK_INDEX_BYTES: u64 = 80;
@@ -389,7 +389,7 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
-    /// Writes a statement of a loss between `from` and `to`; `None` if a time is unknown. Closes the chunk.
+    /// Records a loss between `from` and `to` in the log; `None` if a time is unknown. Closes the chunk.
     ///
     /// Errors: an error of the writer.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {

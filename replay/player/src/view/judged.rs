@@ -33,7 +33,7 @@ pub(super) struct Sections {
 }
 
 impl Sections {
-    /// Notes the change of a run.
+    /// Stores the change of a run, until the next judgement.
     pub(super) fn run(&mut self, id: u64, change: u64) {
         self.changed_runs.push((id, change));
     }

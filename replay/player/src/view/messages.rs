@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn times_and_numbers_are_serialised_briefly() {
+    fn times_and_numbers_are_serialised_compactly() {
         let json = |value: &dyn erased::Json| value.json();
         assert_eq!(json(&Time::from(MonoNs(12_000_000_034))), r#"{"sec":12,"nsec":34}"#);
         assert_eq!(json(&Xyz::new([1.0 / 3.0, -0.000_01, f64::NAN])), r#"{"x":0.3333,"y":0.0,"z":0.0}"#);

@@ -184,7 +184,7 @@ impl View {
         Some(())
     }
 
-    /// Publishes the messages that are due from time to time.
+    /// Publishes the messages that are due at regular intervals.
     fn beat(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
         self.at = at;
         made.push_some(Topic::Points, self.points.close_before(at).as_ref());

@@ -29,7 +29,8 @@ struct Parameters {
     inserted: f64,
 }
 
-/// Selects the affected bytes. All bytes have the same probability, so the gaps between affected bytes are drawn.
+/// Selects the affected bytes. All bytes have the same probability. One random number therefore gives the number of
+/// bytes to the next affected one.
 struct Hits {
     stream: Stream,
     kind: u64,

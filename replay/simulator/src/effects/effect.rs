@@ -14,7 +14,8 @@ pub trait EffectKind: Sync {
     /// Summary of the effect on one line.
     fn summary(&self) -> &'static str;
 
-    /// Reads the effect's tables. There are several tables if `[[effects.NAME]]` differs by sensor.
+    /// Reads the effect's tables. A scene has several `[[effects.NAME]]` tables if the keys differ by sensor or
+    /// stretch.
     ///
     /// Errors: a key is missing, unknown or out of range; a named sensor doesn't exist.
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError>;

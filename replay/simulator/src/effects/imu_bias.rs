@@ -63,8 +63,8 @@ struct ImuBias {
     /// Current tilt in roll and pitch, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Last sample interval, with two factors for biases and for tilt: the correlation over the interval, and the
-    /// weight of a new draw.
+    /// Last sample interval, and two factors each for biases and for tilt: the correlation over the interval, and the
+    /// weight of a new random number.
     ///
     /// The factors are kept because most samples have the same interval.
     kept: (DurNs, [[f64; 2]; 2]),
@@ -225,8 +225,8 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Compares, over many seeds, the variance at the first sample and much later, and the correlation between the two
-    /// with exp(-t / tau).
+    /// Over many seeds, the variance at the first sample and much later is as given, and the correlation between the
+    /// two samples is exp(-t / tau).
     #[test]
     fn biases_are_stationary_and_decorrelate_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);

@@ -18,15 +18,15 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Length of a time span, s. A span contains at most one bump.
+/// Length of the time spans into which a dive is divided, s. Each contains at most one bump.
 const SPAN_S: f64 = 1.0;
 
 /// From time to time the vehicle bumps into the wall, a rock or its own cable. It is pushed one way and swings back.
 ///
 /// Keys, with defaults in brackets:
 /// - `per_hour`, up to 1,800 (required).
-/// - `speed_mps = [least, most]`, the speed that a bump gives the vehicle ([0.02, 0.1]). Speed and direction are drawn
-///   evenly.
+/// - `speed_mps = [least, most]`, the speed that a bump gives the vehicle ([0.02, 0.1]). Speed and direction are
+///   uniformly distributed.
 /// - `seconds`, from the first touch until the vehicle is at rest again, 0.01 to 1 (0.2).
 ///
 /// The force is one period of a sine, so the speed is gained and lost again. The vehicle moves by some millimetres,
@@ -175,8 +175,8 @@ mod tests {
         (0..spans).filter_map(|span| bumps.drawn(span)).map(|(_, speed)| speed).collect()
     }
 
-    /// Directions are evenly distributed on a sphere: each component has mean 0 and mean square 1/3. Sizes are evenly
-    /// distributed from least to most, as mean and variance show.
+    /// Directions are uniformly distributed on a sphere: each component has mean 0 and mean square 1/3. Sizes are
+    /// uniformly distributed from least to most, as mean and variance show.
     #[test]
     fn bump_directions_and_sizes_are_uniformly_distributed() {
         let bumps = bumps(20_000);

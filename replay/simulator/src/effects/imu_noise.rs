@@ -119,7 +119,7 @@ mod tests {
 
     /// White noise with density N has an Allan deviation of N / sqrt(t) for means over any time t.
     #[test]
-    fn rate_and_force_noise_have_the_given_densities_over_any_time() {
+    fn rate_and_force_noise_have_the_given_densities_for_any_averaging_time() {
         let (plain, noisy) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let period_s = plain[0].period.as_secs_f64();
         let parts = |f: fn(&Inertia) -> [f64; 3]| -> Vec<[f64; 3]> {
@@ -140,7 +140,8 @@ mod tests {
                     let n = (means.len() - 1) as f64;
                     let variance = squares / n / 2.0;
                     let wanted = density * density / (period_s * length as f64);
-                    // Neighbouring differences share a mean, so the estimate's variance is 3/n of its square.
+                    // Neighbouring differences share a mean. The variance of the estimate, relative to its square, is
+                    // therefore 3/n.
                     let off = variance / wanted - 1.0;
                     assert!(off.abs() < 5.0 * math::sqrt(3.0 / n), "{length} {axis}: {off}");
                 }

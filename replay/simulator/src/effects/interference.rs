@@ -225,7 +225,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound at this range arrives before all other sounds, and not below the least range.
+    /// Whether a sound at this range arrives before all other sounds, and the range is at least the least range.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }

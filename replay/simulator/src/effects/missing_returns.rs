@@ -25,7 +25,7 @@ use crate::stages::Stage;
 /// The three parts are independent of each other, and at least one is required. Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which returns are lost.
 /// - `share`, the share of pings lost at random, from 0 to 0.95 (0). `mean_run`, the mean number of consecutive lost
-///   pings, to 10,000. It is at least 1 and at least share / (1 - share). The default 1 / (1 - share) makes pings
+///   pings, up to 10,000. It is at least 1 and at least share / (1 - share). The default 1 / (1 - share) makes pings
 ///   independent.
 /// - `grazing_from_deg` and `grazing_to_deg`, the incidence above which some pings are lost, and the incidence from
 ///   which all are lost; from 0, perpendicular to the wall, to 90.
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_length_ramp_loses_far_walls_sharply() {
+    fn ramp_of_zero_length_is_a_sharp_edge() {
         let dive = Dive::with_head();
         let base = dive.dive("").ranges_m(0);
         let lost = lost(&dive, "far_from_m = 3\nfar_to_m = 3");

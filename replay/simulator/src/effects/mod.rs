@@ -142,7 +142,7 @@ impl Named {
         self.0.iter().any(|(kind, _)| kind.name() == name)
     }
 
-    /// Adds the effects of a text of tables. None of these effects may be present already.
+    /// Adds the effects of the `[effects]` tables in a TOML text. None of these effects may be present already.
     ///
     /// Errors: see [`EffectKind::read`].
     pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {

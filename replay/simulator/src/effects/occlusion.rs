@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbour_hides_twice_the_arcsine_of_radius_over_distance() {
+    fn neighbour_occludes_an_angle_of_two_asin_radius_over_distance() {
         let dive = side_by_side();
         let scene = dive.scene("").unwrap();
         let radius_m = scene.facts.sensors[1].head.unwrap().body.radius_m;
@@ -186,13 +186,13 @@ mod tests {
     }
 
     #[test]
-    fn heads_in_one_place_hide_nothing() {
+    fn heads_in_one_place_do_not_occlude_each_other() {
         let dive = Dive::with_heads(&[[0.0; 3], [0.0; 3]]);
         assert_eq!(dive.dive("").messages, dive.dive("[effects.occlusion]").messages);
     }
 
     #[test]
-    fn hull_and_tether_hide_only_if_enabled() {
+    fn hull_and_tether_occlude_only_if_enabled() {
         let below = Dive {
             vehicle: "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]",
             ..Dive::with_head()

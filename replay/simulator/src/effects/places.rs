@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// A step draws the same random numbers in a stretch as in the whole tunnel.
+    /// At each step, an effect uses the same random numbers in a stretch as in the whole tunnel.
     #[test]
     fn stretches_that_cover_the_tunnel_equal_the_whole_tunnel() {
         let dive = Dive { seconds: 40.0, ..Dive::with_head() };

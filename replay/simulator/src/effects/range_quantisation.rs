@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn echosounder_steps_are_metres_of_water() {
+    fn echosounder_steps_are_in_metres_of_water() {
         let mut dive = Dive::with_sounder();
         dive.trajectory = "place_m = [0.123, 2]";
         assert_lattice(&dive, "[effects.range_quantisation]\nquantum_m = 0.15", 0.15);

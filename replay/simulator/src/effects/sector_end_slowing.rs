@@ -127,10 +127,10 @@ mod tests {
         }
     }
 
-    /// Long after the previous reversal, the head moves at w (2 exp(-t / T) - 1) after a reversal of the command. The
-    /// head itself therefore reverses T ln 2 later.
+    /// The command reverses at time 0, long after its previous reversal. The head then moves at w (2 exp(-t / T) - 1),
+    /// and reverses at T ln 2.
     #[test]
-    fn steps_are_short_at_reversals_and_whole_between() {
+    fn steps_are_short_at_reversals_and_full_elsewhere() {
         let (plain, slowed) = (pings(""), pings(KEYS));
         let step_rad = turned(&plain[0], &plain[1]).abs();
         let period_s = between_s(&plain[0], &plain[1]);

@@ -81,7 +81,8 @@ impl Effect for PerSensor<Places<Parameters>> {
 impl Parameters {
     /// Ratio of reported to true range for an echo from one height to another.
     fn scale(&self, from_z_m: f64, to_z_m: f64) -> f64 {
-        // The speed is never less than a third of the speed at the floor, however deep a hollow is.
+        // Far above or below the floor, the linear speed could fall to zero. It is kept above a third of the speed at
+        // the floor.
         let at_mps = |z_m: f64| (self.floor_mps + self.per_metre_mps * z_m).max(self.floor_mps / 3.0);
         let [from_mps, to_mps] = [from_z_m, to_z_m].map(at_mps);
         let faster = to_mps / from_mps - 1.0;

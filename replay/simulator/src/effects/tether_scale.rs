@@ -128,7 +128,7 @@ mod tests {
 
     /// If the scene gives no drag, the drag is 0.05 N/m. The mean tension is half of the total drag.
     #[test]
-    fn stiffness_and_drag_keys_set_the_stretch() {
+    fn stiffness_and_drag_keys_set_the_cable_strain() {
         let plain = counts("");
         for (keys, strain_pm) in
             [("stiffness_n = 2000\n", 1.25e-5), ("stiffness_n = 2000\ndrag_npm = 0.4\n", 1e-4)]

@@ -15,14 +15,14 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of a stretch of travel, m. The cable slips at most once in each stretch.
+/// Length of the stretches into which the travel is divided, m. The cable slips at most once in each stretch.
 const STRETCH_M: f64 = 1.0;
 
 /// From time to time the cable slips over the counter's wheel. A slip changes the count permanently.
 ///
-/// The cable slips `per_100m` times per hundred metres of travel, forwards or back. The size of a slip is drawn evenly
-/// from `size_m = [least, most]` (0.05 to 0.3 by default), with either sign. Travel is the distance that the vehicle
-/// moves, summed from count to count.
+/// The cable slips `per_100m` times per hundred metres of travel, forwards or back. The size of a slip is uniformly
+/// distributed over `size_m = [least, most]` (0.05 to 0.3 by default), with either sign. Travel is the distance that
+/// the vehicle moves, summed from count to count.
 pub(super) struct TetherSlipKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn travel_back_counts_like_travel_forward() {
+    fn cable_slips_equally_on_the_way_forward_and_back() {
         let ahead = slips((0..40_000).map(|k| f64::from(k) * 0.125));
         let back_and_forth = slips(
             (0..40_000).map(|k| f64::from(if k / 800 % 2 == 0 { k % 800 } else { 800 - k % 800 }) * 0.125),

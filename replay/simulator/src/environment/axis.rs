@@ -37,7 +37,7 @@ pub(super) struct Piece {
     curvature_pm: f64,
 }
 
-/// A point of the axis, with the plane through it at a right angle to the axis.
+/// A point of the axis. It defines the plane through the point, perpendicular to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Station {
     /// Point of the axis.

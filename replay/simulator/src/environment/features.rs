@@ -74,7 +74,9 @@ impl Features {
     }
 }
 
-/// Checks that the hollow opens from the tube's wall and not from a mesh, and returns it.
+/// Returns the hollow if it opens from the tube's wall.
+///
+/// Errors: it opens from a mesh.
 fn opening(
     ground: Ground<'_>,
     table: &Section<'_>,

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::vector::{Face, Frame, Ray, V3};
 use crate::mesh::Mesh;
 
-/// Distance by which points close to the end plane of a wall are moved into the wall, m. The mesh is open in the plane
-/// itself.
+/// Least distance from a mesh wall's end planes, m. A point nearer to a plane is moved to this distance, since the mesh
+/// is open in the plane itself.
 const INTO_M: f64 = 1e-7;
 
 /// A closed mesh in the water.
@@ -59,7 +59,7 @@ impl MeshWall {
         self.mesh.contains(self.between_ends(self.frame.local(point)))
     }
 
-    /// First hit of the ray on the mesh between `t_m` and `until_m`, at which the ray passes an end plane.
+    /// First hit of the ray on the mesh, searched from `t_m` to `until_m`. The ray passes an end plane at `until_m`.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, until_m: f64) -> Option<(f64, Face)> {
         let local = self.frame.local_ray(ray);
         // A ray from a point enclosed by the mesh leaves the mesh only through the ends.

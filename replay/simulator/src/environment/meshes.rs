@@ -82,7 +82,8 @@ fn parse_body(
         let why = format!("reaches out of the tunnel, which goes from 0 to {} m", site.length_m);
         return Err(misplaced(table, (from_m, to_m), &why));
     }
-    // In a bend, a point off the axis may lie anywhere ahead of the origin or behind it.
+    // In a bend, a corner's x doesn't give its chainage. The corner's distance from the origin is used instead, both
+    // ahead and behind.
     let reach_m = corners.iter().map(|(x, y)| math::hypot(*x, *y)).fold(0.0, f64::max);
     let reach_m = if site.axis.is_straight() { [back_m, ahead_m] } else { [-reach_m, reach_m] };
     let span_m = span_m(site.axis, chainage_m, reach_m);

@@ -248,7 +248,7 @@ impl Environment {
 
     /// Replaces the range to the smooth wall by the range to the rough wall.
     ///
-    /// The point stays on the smooth wall, so the side of the wall with the water stays certain.
+    /// The point stays on the smooth wall, so it remains certain which side of the wall is water.
     fn roughened(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
         let cosine = -direction.dot(&hit.normal);
         let deeper_m = self.rough.deeper_m(hit.point, (hit.range_m, cosine), chainage_m);
@@ -346,7 +346,7 @@ impl Environment {
         Some(Reach { t_m: 0.0, stop: Some(Stop::Wall(None)), from_m: hollow.span_m.0, to_m: hollow.span_m.1 })
     }
 
-    /// Extends a ray from the end of the tube through the hollows there, and through tube beyond the hollows.
+    /// Extends a ray from the end of the tube through the hollows there, and through any tube beyond the hollows.
     fn go_on_through_hollows(&self, ray: &Ray, far_m: f64, reach: &mut Reach) {
         for _ in 0..MOST_PASSAGES {
             let before_m = reach.t_m;
@@ -375,8 +375,8 @@ impl Environment {
         }
     }
 
-    /// The hollow at the end of the ray that extends farthest: range of the hollow's end, the normal there, and the
-    /// hollow.
+    /// Among the hollows at the end of the ray, the one that extends farthest: the range of its end, the normal there,
+    /// and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
         // The index lists hollows by the chainage of their openings. Deeper in the rock, a hollow may meet any other

@@ -11,8 +11,8 @@ use super::keys;
 use super::scatter::Scatter;
 use crate::stretch::Stretch;
 
-/// Least cosine of incidence for the effect of a height on the range. At more grazing incidence the bumps hide the
-/// hollows between them.
+/// Lower limit of the cosine of incidence when a height is converted to a change of range. At more grazing incidence
+/// the bumps hide the hollows between them.
 const LEAST_COSINE: f64 = 0.25;
 /// Standard deviation of the sum of four 16-bit random numbers, in units of their range: the square root of 4 / 12.
 const SUM_SD: f64 = 0.577_350_269_189_625_8;

@@ -277,8 +277,8 @@ impl Tube {
         stretch.mesh.and_then(|number| self.meshes.get(number))
     }
 
-    /// Range between `t_m` and `until_m` at which the ray leaves the tube within the stretch, with the face if a mesh
-    /// is the wall.
+    /// Returns the range at which the ray leaves the tube, searched from `t_m` to `until_m` within the stretch. If a
+    /// mesh is the wall there, also returns the face that the ray hits.
     fn leave_stretch(
         &self,
         stretch: &Stretch,
@@ -327,7 +327,8 @@ impl Tube {
         );
         match hit {
             Some(hit) => Some(t_m + hit.range_m),
-            // There is no wall ahead only for a point on the wall itself or a ray along the axis.
+            // Two cases have no wall ahead: a point on the wall itself, which ends the ray here, and a ray along the
+            // axis.
             None => (self.gauge(stretch, at) > 1.0 - 1e-9).then_some(t_m),
         }
     }
@@ -371,8 +372,8 @@ impl Tube {
         distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
     }
 
-    /// The profile's wall in the direction of an unscaled point from the reference point, and the distance from there
-    /// to the point, m.
+    /// The profile's wall in the direction from the reference point to an unscaled point, and the distance between
+    /// these two points, m.
     fn outwards(&self, unscaled: Yz) -> Option<(headrace_geometry::tunnel::WallHit, f64)> {
         let [ry, rz] = self.profile.reference();
         let out = [unscaled[0] - ry, unscaled[1] - rz];
@@ -382,8 +383,8 @@ impl Tube {
 
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     fn unscaled(&self, section: Yz, scale: f64) -> Yz {
-        // Without this return, adding and subtracting the floor's position could cost a bit. The plain case must equal
-        // the profile exactly.
+        // Without this return, adding and subtracting the floor's position could change the last bit. The plain case
+        // must equal the profile exactly.
         if scale == 1.0 {
             return section;
         }
@@ -458,7 +459,8 @@ fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) ->
         }
         let t = below.0 - below.1 * (above.0 - below.0) / (above.1 - below.1);
         let value = f(t);
-        // The value at an end that is kept twice is halved. Without that, the bracket would shrink from one side only.
+        // If an end of the bracket is kept twice in a row, its value is halved. Otherwise the bracket could shrink from
+        // one side only.
         if value < 0.0 {
             below = (t, value);
             if kept == 1 {

@@ -100,7 +100,7 @@ impl Surface {
     }
 }
 
-/// Checks the number of elements, the corner numbers and the coordinates.
+/// Checks the number of elements, the vertex numbers of the faces, and the coordinates.
 fn numbers(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<(), MeshError> {
     for (what, given) in [("vertices", vertices.len()), ("faces", faces.len())] {
         if u32::try_from(given).is_err() {
@@ -142,8 +142,8 @@ pub(super) fn diagonal(low: [f64; 3], high: [f64; 3]) -> f64 {
 /// For each vertex, the number of the first vertex within welding distance.
 fn weld(vertices: &[[f64; 3]], low: [f64; 3], diagonal: f64) -> Vec<u32> {
     let near = (WELD * diagonal).max(f64::MIN_POSITIVE);
-    // A cell is several times as wide as the welding distance. Most vertices therefore search only one cell, and no
-    // cell holds many vertices.
+    // A cell is several times as wide as the welding distance. For most vertices only one cell is therefore searched,
+    // and no cell holds many vertices.
     let cell = 8.0 * near;
     let mut cells: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     let mut welded = Vec::with_capacity(vertices.len());

@@ -33,7 +33,7 @@ pub enum MeshError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// The coordinates of a vertex are not finite or too large.
+    /// A coordinate of a vertex is too large or not finite.
     #[error("vertex {vertex} (counted from 0) is at {}; coordinates must be finite and within 100 km of 0", At(*at))]
     FarVertex {
         /// Number of the vertex.

@@ -76,7 +76,8 @@ impl Ray {
                 far = last;
             }
         }
-        // The bound is below any hit in the box, even at range 0. An equal hit in another box is therefore found too.
+        // The bound is less than the range of any hit in the box, even at range 0. A hit at an equal range in another
+        // box is therefore found too.
         if near <= far * WIDER { near / WIDER / WIDER - f64::MIN_POSITIVE } else { f64::INFINITY }
     }
 

@@ -82,7 +82,7 @@ fn triangles_are_read_back_in_every_encoding() {
 }
 
 #[test]
-fn polygons_are_split_into_triangles_and_text_keeps_its_digits() {
+fn polygons_are_split_into_triangles_and_text_files_keep_all_digits() {
     let ply = "ply\r\nformat ascii 1.0\r\nelement vertex 5\r\nproperty float x\r\nproperty int y\r\nproperty float \
                z\r\nelement face 1\r\nproperty list uchar uint vertex_index\r\nend_header\r\n0 0 0\r\n0.1 0 0\r\n1 1 0\r\n0 \
                1 0\r\n-1 0.5 12345.678\r\n5 0 1 2 3 4\r\n\r\n";
@@ -181,7 +181,7 @@ fn wrong_counts_allocate_no_memory() {
 proptest! {
     /// Arbitrary bytes give a mesh or an error, and never a panic.
     #[test]
-    fn any_bytes_give_a_mesh_or_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
+    fn arbitrary_bytes_give_mesh_or_error(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
         let starts = ["", "ply\nformat ascii 1.0\n", "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float "];
         let bytes = [starts[start].as_bytes(), &bytes].concat();
         if let Ok(t) = read(&bytes) {

@@ -13,13 +13,13 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// A position depends on the knots up to this many after its time.
+/// Number of knots after a time on which the position at that time depends.
 const KNOTS_AHEAD: i64 = 3;
 /// Speed at which the pilot goes back, m/s.
 const BACK_MPS: f64 = 0.2;
-/// Distance behind the vehicle, m, at which a missed stretch makes the pilot go back. After it, the run-up before the
-/// second pass, m.
+/// Least distance of a missed stretch behind the vehicle at which the pilot goes back, m.
 const BEHIND_M: f64 = 3.0;
+/// Run-up before the second pass over a missed stretch, m.
 const RUN_UP_M: f64 = 2.5;
 /// Period over which the ratio of driven to advised speed varies, s.
 const HOLD_S: f64 = 20.0;

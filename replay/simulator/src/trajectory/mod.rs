@@ -92,7 +92,7 @@ impl Trajectory {
         place
     }
 
-    /// Adds a further motion over the current duration.
+    /// Adds a further motion to the trajectory. The duration stays the same.
     pub fn sway(&mut self, knots: Knots) {
         self.sways.push(knots);
     }

@@ -75,7 +75,7 @@ const PILOT: &str = "kind = \"pilot\"\nplace_m = [0, 5]\nstart_m = 3\nspeed_mps 
                      backs_per_hour = 90\nwander_yaw_deg = 8\nwander_s = 10\n";
 
 #[test]
-fn pilot_reaches_the_end_within_bounds_both_ways() {
+fn pilot_reaches_the_end_within_bounds_in_both_directions() {
     for (from_m, to_m) in [(3.0, 60.0), (3.0, -15.0)] {
         for seed in 0..20 {
             let (trajectory, ground) = parsed(&format!("{PILOT}to_m = {to_m}\n"), seed).unwrap();
@@ -239,8 +239,8 @@ fn random_drift_has_the_given_amplitude_and_spread() {
         products += offsets[0] * offsets[1] / f64::from(count);
     }
     for (variance, reach) in squares.into_iter().zip(reach) {
-        // The tolerance fits about 2,000 independent intervals. The variance is 151/315 of the variance of uniform
-        // random numbers.
+        // The tolerance is that of a variance from about 2,000 independent values. The variance is 151/315 of the
+        // variance of uniform random numbers.
         let wanted = reach * reach / 3.0 * 151.0 / 315.0;
         assert!((variance - wanted).abs() <= 0.1 * wanted, "{variance} {wanted}");
     }

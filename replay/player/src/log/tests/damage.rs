@@ -323,7 +323,7 @@ fn damaged_attachment_is_reported_by_name() {
 }
 
 #[test]
-fn files_other_than_mcap_are_refused_with_their_first_bytes() {
+fn error_for_a_file_other_than_mcap_shows_its_first_bytes() {
     let error = |bytes: &[u8]| {
         LogReader::new(Cursor::new(bytes.to_vec()), "dive.mcap".to_owned()).err().unwrap().to_string()
     };
@@ -403,7 +403,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_read_as_a_log_without_a_panic(
+    fn arbitrary_bytes_are_read_as_a_log_without_a_panic(
         start in prop::sample::select(vec![&b""[..], &b"\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"[..]]),
         bytes: Vec<u8>,
         records in prop::collection::vec((0_u8..17, 0_u64..80, prop::collection::vec(any::<u8>(), 0..80)), 0..20),

@@ -124,7 +124,7 @@ fn replaced_chunk_is_reported_as_missing_messages() {
 }
 
 #[test]
-fn removed_chunk_without_summary_is_reported_at_its_place() {
+fn chunk_removed_from_a_log_without_summary_is_reported_at_its_place() {
     each(|what, records| {
         let places = chunks(&records);
         for (number, chunk) in places.iter().enumerate() {
@@ -264,7 +264,7 @@ fn chunk_of(content: &[u8], times: [u64; 2]) -> Vec<u8> {
 }
 
 #[test]
-fn chunk_within_a_chunk_is_reported_and_stated_by_recovery() {
+fn chunk_within_a_chunk_is_reported_and_listed_by_recovery() {
     each(|what, records| {
         let mut records = records;
         let place = chunks(&records)[2];

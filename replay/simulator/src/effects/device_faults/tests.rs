@@ -125,7 +125,7 @@ fn slice_length_does_not_change_results() {
 }
 
 #[test]
-fn invalid_faults_are_refused_with_their_key() {
+fn error_for_an_invalid_fault_names_the_key() {
     assert!(refusal("[effects.device_faults]\n").contains("kind"));
     assert!(refusal("[effects.device_faults]\nkind = \"jump\"\n").contains("size"));
     assert!(refusal("[effects.device_faults]\nkind = \"die\"\nsize = 1\n").contains("\"jump\" only"));

@@ -14,7 +14,7 @@ const HEARD_M: f64 = 100.0;
 const HEARD_AT_KHZ: f64 = 675.0;
 const HEARD_DBPM: f64 = 0.2;
 const HEARD_PULSE_S: f64 = 540e-6;
-/// Excess of the echo of rough rock at 1 m over the threshold, at a gain of 20 dB, dB.
+/// Level of the echo of rough rock at 1 m, in dB above the threshold, at a gain of 20 dB.
 ///
 /// This is an assumption, since the maker states no threshold. With the usual gains, a wall's echo is then above the
 /// threshold if the absorption setting matches the water's absorption.
@@ -27,7 +27,7 @@ const VISCOSITY_M2PS: f64 = 1.307e-6;
 /// Decibels per neper.
 const DB_PER_NEPER: f64 = 8.685_889_638_065_037;
 
-/// Sound of a head in this water.
+/// Acoustic properties of a head, its water and its wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sonar {
     /// Full width of the beam, radians.

@@ -28,7 +28,7 @@ fn water_absorption_matches_measurements() {
 /// The drag is that on an oscillating sphere (Landau and Lifshitz, "Fluid mechanics", §24, problem 5). The sound loses
 /// the work done by the drag.
 #[test]
-fn silt_absorption_matches_friction_at_its_grains() {
+fn silt_absorption_matches_the_drag_on_its_grains() {
     let (sound_mps, viscosity) = (1447.0, 1.307e-6);
     for (frequency_khz, grain_m) in [(675.0, 2e-6), (1000.0, 5e-6), (1000.0, 20e-6)] {
         let omega = math::TAU * frequency_khz * 1000.0;
@@ -56,7 +56,8 @@ fn silt_absorption_matches_friction_at_its_grains() {
             v = next;
         }
         let power = work / (5.0 * math::TAU / omega);
-        // For a sound velocity amplitude of 1, the power per area is c / 2, per unit of the water's density.
+        // If the water moves with velocity amplitude 1, the sound's power per area, divided by the water's density, is
+        // c / 2.
         let volume = 1.0 / 2650.0;
         let neper_pm = volume * power / (sound_mps / 2.0) / 2.0;
         let scattering_neper_pm =

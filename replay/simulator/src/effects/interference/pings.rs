@@ -63,7 +63,7 @@ impl Ping {
 }
 
 impl Pings {
-    /// Drops pings earlier than `rings_s` before `from`. The last two pings are kept for extrapolation.
+    /// Drops pings that are more than `rings_s` earlier than `from`. The last two pings are kept for extrapolation.
     pub(super) fn forget(&mut self, from: MonoNs, rings_s: f64) {
         let old = |ping: &Ping| from.since(ping.at).as_secs_f64() > rings_s;
         let gone = self.0.partition_point(old).min(self.0.len().saturating_sub(2));
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn future_pings_continue_the_last_two() {
+    fn future_pings_are_extrapolated_from_the_last_two() {
         let mut pings = Pings::default();
         for k in 0..100 {
             pings.add(ping(20 * k, f64::from(i32::try_from(k).unwrap()) * 0.02));

@@ -90,7 +90,8 @@ fn reflected_and_direct_paths_give_their_apparent_ranges() {
     assert_eq!(heard(right - 0.3, left, 0.0), None);
 }
 
-/// Two heads half a turn apart face each other twice per turn. Each then hears the other at half their distance.
+/// Two heads half a turn apart face each other twice per turn. Each then hears the other at an apparent range of half
+/// their distance.
 #[test]
 fn synchronous_heads_hear_each_other_when_facing() {
     let dive = pair();

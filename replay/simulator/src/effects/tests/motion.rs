@@ -51,8 +51,8 @@ fn row(at: u64, values: &[f64]) -> [f64; 9] {
     row
 }
 
-/// Effects on other sensors change neither the draws of an effect on one sensor, nor the measurements of sensors
-/// without effects.
+/// Effects on other sensors change neither the random numbers of an effect on one sensor, nor the measurements of
+/// sensors without effects.
 #[test]
 fn naming_an_effect_changes_nothing_for_other_sensors() {
     for (sensor, alone) in ALONE.iter().filter(|(sensor, _)| !sensor.is_empty()) {

@@ -22,7 +22,8 @@ fn pair() -> Dive {
     Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]])
 }
 
-/// Changes of each measurement by an effect. `effect` is the effect's index in the scene.
+/// For each measurement, the values before and after its change by an effect; `None` if unchanged. `effect` is the
+/// effect's index in the scene.
 fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
     let of = |row: &TruthRow| {
         let cause = row.causes.iter().find(|cause| cause.effect == effect)?;
@@ -32,7 +33,7 @@ fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
 }
 
 #[test]
-fn naming_an_effect_does_not_change_draws_of_others() {
+fn naming_an_effect_keeps_the_random_numbers_of_others() {
     let dive = pair();
     let outliers = |before: &str, place: u16| {
         let strays = changes(&dive.dive(&format!("{before}[effects.outliers]\nshare = 0.2")), place);
@@ -49,7 +50,7 @@ fn naming_an_effect_does_not_change_draws_of_others() {
 }
 
 #[test]
-fn adding_a_head_does_not_change_draws_of_the_first() {
+fn adding_a_head_keeps_the_random_numbers_of_the_first() {
     let effects = [EFFECTS[2], EFFECTS[3], EFFECTS[5], EFFECTS[6], EFFECTS[8]].concat();
     let bits = |dive: &Dive| {
         let ranges_m = dive.dive(&effects).ranges_m(0);

@@ -29,7 +29,7 @@ fn plain_tunnel_equals_the_profile_bit_for_bit() {
 }
 
 #[test]
-fn tunnel_as_built_may_have_another_profile_than_the_design() {
+fn as_built_profile_may_differ_from_the_design() {
     let text = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4";
     let environment = parse(text, &shapes::ceran().unwrap());
     Oracle::new(Shape::Circle(4.0)).compare(&environment, 2, 1_000, [0.0, 50.0]);
@@ -130,7 +130,7 @@ fn combined_bends_stations_and_bulges_match_the_model() {
 }
 
 #[test]
-fn arc_length_is_on_the_design_profile_in_the_axis_chart() {
+fn arc_length_is_measured_on_the_design_profile_in_bends_too() {
     let design = shapes::ceran().unwrap();
     let environment =
         parse(&format!("{}[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4", bends()), &design);
