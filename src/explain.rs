@@ -108,7 +108,7 @@ fn worth_in_json(worth: &EffectInfluence) -> Value {
     })
 }
 
-/// Text on the worth of the effects: first the cheapest sufficient set, then each effect, the most expensive
+/// Text about the worth of the effects: first the cheapest sufficient set, then each effect, the most expensive
 /// first.
 fn worth_in_words(worth: &EffectInfluence) -> String {
     let kept =

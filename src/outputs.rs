@@ -49,7 +49,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Reason for which a file of another kind is not overwritten.
+    /// Reason why a file of another kind is not overwritten.
     fn refusal(self) -> &'static str {
         match self {
             Self::Report => "isn't a report",

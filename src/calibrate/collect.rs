@@ -25,7 +25,7 @@ pub(crate) struct Window {
     pub(crate) at_surface_s: Option<[f64; 2]>,
 }
 
-/// Reason for which readings can't be collected.
+/// Reason why readings can't be collected.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum CollectError {

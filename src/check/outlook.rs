@@ -1,4 +1,4 @@
-//! Outlook: largest speed, hours and hidden wall, as planned from a vehicle file.
+//! Outlook for a vehicle file: the largest speed, the hours of a dive, and the wall that the vehicle hides.
 
 use headrace_sampling::SamplingError;
 use headrace_sampling::head::HeadMode;
@@ -9,9 +9,9 @@ use serde_json::{Value, json};
 
 /// Plan for a file as it is. The vehicle is on the tunnel's axis.
 pub(super) struct Outlook {
-    /// Answer for the mode that all heads have; `None` if their modes differ.
+    /// The planner's answer for the mode that all heads have; `None` if their modes differ.
     own: Option<Answer>,
-    /// Answer with the largest speed.
+    /// The planner's answer with the largest speed.
     best: Option<Answer>,
     /// Largest speed, m/s, if the heads are set in phase for the planned speed.
     ///
@@ -26,8 +26,8 @@ pub(super) struct Outlook {
     length_m: f64,
 }
 
-/// Relative difference below which two speeds are reported as one. It is the advice's margin for measuring
-/// the speed.
+/// Relative difference below which two speeds are reported as one. It equals the margin that the advice keeps
+/// for errors of the measured speed.
 const TOLD_APART: f64 = 0.02;
 /// Relative difference below which two turn periods are equal.
 const SAME: f64 = 1e-6;
@@ -152,7 +152,7 @@ impl Outlook {
         lines
     }
 
-    /// Text on the wall that the vehicle hides from some or all heads.
+    /// Text about the wall that the vehicle hides from some or all heads.
     fn hidden_line(&self) -> String {
         if self.hidden.is_empty() {
             return "every head sees all of the wall".to_owned();

@@ -19,7 +19,7 @@ use crate::output::append;
 
 /// Number of rows of the clock strips.
 pub(super) const CLOCK_ROWS: usize = HOURS;
-/// Columns of a sensor's lamp with the age of its data, and without it.
+/// Width of a sensor's entry with and without the age of its data, columns.
 const LAMP_COLUMNS: [usize; 2] = [24, 19];
 /// Width of the strips' labels.
 const LABEL: usize = 6;
@@ -352,7 +352,7 @@ fn known_style(known: Known, ink: Palette) -> Style {
     }
 }
 
-/// Mark for a hole. Its height is in eighths, and half of it is the target.
+/// Bar for a hole. Half of the full height stands for the target, and the full bar has eight steps.
 fn hole_mark(cell: Cell, ink: Palette) -> (char, Style) {
     let Some(share) = cell.share else {
         return (if cell.known == Known::Unseen { '·' } else { ' ' }, Palette::dim()).ascii(ink);

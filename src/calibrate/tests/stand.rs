@@ -36,7 +36,7 @@ pub(super) struct Stand {
     pub(super) site: Site,
     pub(super) settings: Settings,
     pub(super) wrong: Vec<Wrong>,
-    /// Position y and z, m. Below: roll, pitch and yaw, degrees.
+    /// Position y and z, m; then roll, pitch and yaw, degrees.
     pub(super) at: [f64; 2],
     pub(super) turned_deg: [f64; 3],
     pub(super) speed_mps: f64,
@@ -103,7 +103,7 @@ impl Stand {
         (0..HEADS + self.wrong.len()).map(Self::filed).collect()
     }
 
-    /// Passes the stand's readings to `estimate`.
+    /// Simulates the stand's readings, and passes them to `estimate`.
     pub(super) fn ask<T>(&self, estimate: impl FnOnce(&Material<'_>) -> T) -> T {
         let (sensors, events) = (self.sensors(), self.events());
         let Self { profile, site, settings, .. } = self;
