@@ -169,7 +169,7 @@ fn called_in_words(called: &[Called]) -> String {
     text
 }
 
-/// Callers of an effect. If there are many, only the first is named.
+/// Reasons that call for an effect, as text. Only the first three are listed.
 fn by(callers: &[String]) -> String {
     const SHOWN: usize = 3;
     let shown = callers.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("; ");

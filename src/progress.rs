@@ -13,7 +13,7 @@ const AFTER: Duration = Duration::from_secs(2);
 const EVERY: Duration = Duration::from_millis(200);
 /// Number of calls between two reads of the clock.
 const CALLS: u32 = 1000;
-/// Share of the work from which the time left is shown.
+/// Share of the work after which the time left is shown.
 const TELLING: f64 = 0.01;
 
 /// Minimum interval between log messages on progress.

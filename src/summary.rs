@@ -12,7 +12,7 @@ use headrace_monitor::report::{DiveReport, NotInspectedReport, Report, RunReport
 
 use crate::terminal;
 
-/// Duration of a sensor's silence from which it is reported, s.
+/// Shortest silence of a sensor that is reported, s.
 const SILENT_S: f64 = 5.0;
 /// Maximum number of notes listed.
 const MOST_NOTES: usize = 20;

@@ -230,7 +230,7 @@ impl Recorded {
         JudgedDive { report, truth: Arc::clone(&self.truth), sections }
     }
 
-    /// CPU time of a replay with the settings of a vehicle file, without arming and report, s.
+    /// CPU time of a replay with the settings of a vehicle file, s. Arming and the report are excluded.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn cpu_s(&self, vehicle: &VehicleConfig) -> Result<f64, TruthError> {
