@@ -163,7 +163,7 @@ impl Place {
         Ok(Fetched { files, _copy: Some(copy) })
     }
 
-    /// Path in the store of a path below the place.
+    /// Converts a path below the place to a path in the store.
     ///
     /// Errors: none for a listed path.
     fn location(&self, below: &str) -> Result<StorePath, object_store::Error> {

@@ -1,4 +1,4 @@
-//! Device side of the connection: reports at a fixed rate.
+//! Emulates an A50, which sends reports at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};

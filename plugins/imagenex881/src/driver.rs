@@ -1,4 +1,4 @@
-//! Host side of a head's line. The driver keeps one command in flight, and keeps the head on its program.
+//! Driver of a head. It keeps one command in flight, and keeps the head on its program.
 //!
 //! The driver first locates the head. It then homes the head, the short way, to the program's current position, and
 //! requests each ping of the program when due. After a late or lost answer the head lags. The driver then polls it as

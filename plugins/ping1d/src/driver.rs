@@ -1,4 +1,4 @@
-//! Host side of an echosounder's line. The driver sends the settings first, and then gets a distance in each interval.
+//! Driver of an echosounder. It sends the settings first, and then gets a distance in each interval.
 //!
 //! The device must acknowledge each setting. The driver requests distances, or the device sends them continuously.
 

@@ -110,8 +110,8 @@ struct AttachedState {
     dropped_told: u64,
     dropped_until: MonoNs,
     status: Option<(Phase, String)>,
-    /// Number of good frames so far, and when the line was opened. Then the times of the last bytes and of the last
-    /// good frame.
+    /// Number of good frames so far, and the number when the line was opened. Then the times of the last bytes
+    /// and of the last good frame.
     frames: u64,
     frames_before: u64,
     last_bytes: MonoNs,

@@ -234,7 +234,7 @@ fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, Co
     Ok(points)
 }
 
-/// Method name of the points with one effect left out. The default leaves none out and comes first.
+/// Method name of the points with one effect left out. The default point leaves no effect out and comes first.
 const LEFT_OUT: &str = "left out";
 
 fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prepared>, CostError> {

@@ -67,7 +67,7 @@ fn other_messages_devices_and_undefined_values_give_no_reading() {
 }
 
 #[test]
-fn datagram_may_hold_a_part_of_a_frame_or_several() {
+fn datagram_may_hold_part_of_a_frame_or_several_frames() {
     let mut decoder = decoder();
     let two = [frame(&Message::Distance(PING)), frame(&Message::Distance(PING))].concat();
     assert_eq!(decode(&mut decoder, 100, &two[..20]), []);
