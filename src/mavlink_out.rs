@@ -58,7 +58,8 @@ impl MavlinkOut {
         })
     }
 
-    /// Hands a frame to the sending thread. A frame without room is dropped, since a newer one follows.
+    /// Hands a frame to the sending thread. A frame that finds no room in the queue is dropped, since a newer
+    /// one follows.
     fn send(&self, frame: Vec<u8>) {
         if let Some(frames) = &self.frames {
             frames.try_send(frame).ok();

@@ -39,7 +39,8 @@ pub(crate) fn never_wait() {
     NEVER_WAITS.store(true, Ordering::Relaxed);
 }
 
-/// Stdout for one piece of output that no separate thread writes. It is flushed once, at the end.
+/// Opens stdout for one piece of output, which is flushed once, at the end. After [`never_wait`], a caller
+/// waits for at most [`UNREAD_FOR`].
 ///
 /// Errors: stdout has been given up.
 fn stdout() -> io::Result<Box<dyn Write>> {

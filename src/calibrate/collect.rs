@@ -152,7 +152,7 @@ pub(crate) struct Material<'a> {
 }
 
 impl<'a> Material<'a> {
-    /// Readings received from `from` until before `to`, each with its sensor.
+    /// Readings received from `from` (inclusive) to `to` (exclusive), each with its sensor.
     pub(crate) fn during(
         &self,
         from: MonoNs,

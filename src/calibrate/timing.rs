@@ -134,7 +134,7 @@ struct Runs<'a, 'b> {
     material: &'a Material<'a>,
     events: &'a [Event],
     shifts_s: Vec<f64>,
-    /// Whether the likelihood of each source was clearly best at the late end of the search range.
+    /// Whether each source's likelihood was clearly largest at the late end of the search range.
     later: Vec<bool>,
     /// Share of measurements gated in the last run.
     gated: f64,

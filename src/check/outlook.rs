@@ -203,7 +203,7 @@ impl Outlook {
     }
 }
 
-/// Speed for computing results that don't depend on the speed, m/s.
+/// Arbitrary speed for results that don't depend on the speed, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 /// A speed rounded down to 1 mm/s. The printed speed thus meets the target, too.

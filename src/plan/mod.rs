@@ -99,7 +99,7 @@ fn is_met(answer: &Answer) -> bool {
         && answer.spacing.is_some_and(|spacing| spacing.t_max_m.is_some())
 }
 
-/// Speed for computing results that don't depend on the speed, m/s.
+/// Arbitrary speed for results that don't depend on the speed, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;

@@ -104,7 +104,7 @@ impl Cell {
     }
 }
 
-/// Data on the wall within a frame.
+/// Data about the wall within a frame.
 pub(super) struct WallNews {
     pub(super) section_m: f64,
     pub(super) count: usize,

@@ -198,7 +198,7 @@ impl Wire {
         }
     }
 
-    /// Adds frames that were sent whole in another way to the count.
+    /// Adds to the count of whole frames those that were sent by other means than [`Wire::whole`].
     pub fn count(&self, frames: u64) {
         self.control.whole.fetch_add(frames, Ordering::SeqCst);
     }

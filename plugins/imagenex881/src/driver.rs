@@ -36,7 +36,7 @@ const AHEAD_PINGS: u64 = 10;
 /// A head that answers but lags by more than 1/n of the program is reported as too slow for its settings.
 const TOO_SLOW_SHARE: u64 = 8;
 
-/// Number of unanswered commands, among the last 32, from which a lag is blamed on the line and not on the head.
+/// Number of unanswered commands, among the last 32, at which a lag is blamed on the line and not on the head.
 const LOSSY_FROM: u32 = 3;
 
 /// Purpose of a command.

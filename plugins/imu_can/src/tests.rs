@@ -335,7 +335,7 @@ fn only_the_first_received_kind_of_sbg_time_is_followed() {
 }
 
 #[test]
-fn unmeasured_values_are_sent_in_no_frame() {
+fn unmeasured_values_are_not_sent() {
     let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
     for (own, set, whole, without) in [
         ("preset = \"xsens_mti600\"", XSENS, 4, 3),

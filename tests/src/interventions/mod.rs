@@ -42,7 +42,8 @@ pub struct Judged {
     pub run: Option<u32>,
     /// Diameter of the hole, m.
     pub hole_m: f64,
-    /// Diameter of the hole without each single injected cause, m; infinite if the hole can't be measured.
+    /// Diameter of the hole with one injected cause removed, one value per cause, m; infinite if the hole can't
+    /// be measured.
     pub without_m: Vec<f64>,
     /// Evidence for the displayed causes.
     pub evidence: Evidence,

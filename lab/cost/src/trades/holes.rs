@@ -193,7 +193,7 @@ struct Prepared {
     judged: Vec<Vec<Vec<Judged>>>,
 }
 
-/// Times all settings of all cases in turns.
+/// Times all settings of all cases, round by round.
 fn points(
     inputs: &Inputs<'_>,
     settings: &[Setting],

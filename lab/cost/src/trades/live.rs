@@ -258,7 +258,7 @@ impl Marker {
     }
 }
 
-/// Times all markers of all scenes in turns.
+/// Times all markers of all scenes, round by round.
 fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
     let mut all: Vec<(&Recorded, &Marker)> = Vec::new();
     for Prepared { recorded, markers, .. } in &prepared {

@@ -216,7 +216,7 @@ impl Prepared {
     }
 }
 
-/// Times all settings of all scenes in turns.
+/// Times all settings of all scenes, round by round.
 ///
 /// The time saved by leaving an effect out is relative to the scene with all effects.
 fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {

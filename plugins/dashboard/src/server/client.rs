@@ -43,7 +43,7 @@ mod tests {
     use axum::http::HeaderValue;
 
     #[test]
-    fn forwarded_addresses_count_only_behind_declared_proxies() {
+    fn forwarded_addresses_are_used_only_from_declared_proxies() {
         let address = |text: &str| text.parse::<IpAddr>().unwrap();
         let mut headers = HeaderMap::new();
         headers.append(FORWARDED_FOR, HeaderValue::from_static("1.1.1.1, 10.0.0.9"));

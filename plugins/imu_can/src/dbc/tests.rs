@@ -236,7 +236,7 @@ fn dbc_readings_equal_the_preset_readings() {
 }
 
 #[test]
-fn clipped_axes_withhold_their_vector() {
+fn vector_with_a_clipped_axis_is_withheld() {
     let [(mapping, set), ..] = &*MAPPINGS;
     let (rate, force) = (frame(0x32, &[0; 6]), frame(0x34, &[0; 6]));
     for bit in 0..32_u32 {
