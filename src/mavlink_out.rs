@@ -18,9 +18,9 @@ use headrace_monitor::run::Loop;
 use crate::failure::Failure;
 use crate::follower::Follower;
 
-/// Interval of heartbeats, in the loop's time. Source: MAVLink, "Heartbeat/Connection Protocol".
+/// Interval between heartbeats, in the loop's time. Source: MAVLink, "Heartbeat/Connection Protocol".
 const HEARTBEAT_EVERY: DurNs = DurNs(1_000_000_000);
-/// Interval of the figures, in the loop's time.
+/// Interval between the figures, in the loop's time.
 const FIGURES_EVERY: DurNs = DurNs(500_000_000);
 /// Maximum number of frames that wait. It corresponds to about ten seconds.
 const WAITING: usize = 256;

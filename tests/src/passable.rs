@@ -16,8 +16,7 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// Duration at the start of a dive that isn't judged, s. In this time, the filter learns the biases of the
-/// inertial unit.
+/// Unjudged period at the start of a dive, s. In this time, the filter learns the biases of the inertial unit.
 const SETTLES_S: f64 = 100.0;
 /// Length that is judged, m.
 const JUDGED_M: f64 = 8.0;

@@ -387,7 +387,7 @@ impl LineService {
         Ok(Served::Open)
     }
 
-    /// Reports the packets dropped since the last report to the record.
+    /// Reports to the record the packets that were dropped since the last report.
     fn tell_dropped(&mut self) {
         let now = self.common.host.now();
         for AttachedState { attached, history, dropped_told, dropped_until, .. } in &mut self.devices {

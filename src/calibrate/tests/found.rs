@@ -14,7 +14,8 @@ fn found(stand: &Stand) -> Heads {
     stand.ask(|material| heads(material).unwrap())
 }
 
-/// Mount errors of two heads. One head is turned and moved against the file, and for some seeds mirrored.
+/// Mount errors of two heads. One head is turned and moved relative to the vehicle file, and for some seeds it
+/// is mirrored.
 fn wrong(seed: u64) -> [Wrong; 2] {
     let swing = math::sin(seed as f64);
     [

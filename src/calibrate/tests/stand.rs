@@ -20,8 +20,8 @@ const ECHOES: usize = 3;
 pub(super) const HEADS: usize = 7;
 const DEVICE_MPS: f64 = 1500.0;
 
-/// True mount of a head relative to its file: degrees about its axis, m to the left and up, and whether it is
-/// mirrored.
+/// True mount of a head relative to the vehicle file: degrees about its axis, m to the left and up, and whether
+/// it is mirrored.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Wrong {
     pub(super) angle_deg: f64,

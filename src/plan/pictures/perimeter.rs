@@ -70,7 +70,7 @@ impl Around {
         self.places.iter().filter_map(|place| place.t_m).fold(0.0, f64::max)
     }
 
-    /// Place of the widest strip that no head sees, and the T across it.
+    /// Place of the widest strip that no head sees, and the spacing T across it.
     ///
     /// `None` if that T would dwarf all other values.
     fn across_m(&self) -> Option<[f64; 2]> {
@@ -79,7 +79,7 @@ impl Around {
     }
 }
 
-/// Draws the T across the widest strip that no head sees.
+/// Draws the spacing T across the widest strip that no head sees.
 fn across(chart: &Chart<'_>, around: &Around) {
     let Some(point) = around.across_m() else { return };
     let place = chart.px(point);

@@ -149,7 +149,7 @@ fn no_empty_circle_is_wider_than_the_spacing_t() {
     }
 }
 
-/// Names of the modes that meet a target. `words` makes the text on each mode's speed.
+/// Names of the modes that meet a target. `words` makes the text about each mode's speed.
 fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> Vec<String> {
     let planner = Planner::new(inspection).unwrap();
     let speed = |mode| Some((modes::name(&planner, mode), planner.v_max_mps(mode, target_m).ok()?));

@@ -250,12 +250,12 @@ impl Figures {
         (used > 0.0).then(|| sum / used)
     }
 
-    /// Fraction of sections with D_true over the target that passed.
+    /// Among sections with D_true over the target, the fraction that passed.
     pub fn false_passes(&self) -> f64 {
         f64::from(self.passed_over) / f64::from(self.over.max(1))
     }
 
-    /// Fraction of sections with D_true below 0.9 times the target that failed.
+    /// Among sections with D_true below 0.9 times the target, the fraction that failed.
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }

@@ -310,8 +310,8 @@ impl World {
         Duration::from_nanos(u64::try_from(self.clock.now().since(BEGIN).0).unwrap())
     }
 
-    /// Lets the recorder write. Without a disk failure, packets count as certain half a second and one step after the recorder
-    /// took them.
+    /// Lets the recorder write. Without a disk failure, packets count as certainly recorded half a second and
+    /// one step after the recorder took them.
     fn record(&mut self, now: MonoNs) {
         let since_begin = self.since_begin();
         let failures = self.disk.failures();

@@ -8,7 +8,7 @@ use axum::http::{HeaderMap, HeaderName};
 /// from.
 const FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 
-/// Address by which limits count a client.
+/// Address by which rate limits identify a client.
 ///
 /// For IPv6 only the first half counts, because one machine has many addresses with the same first half.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
