@@ -1,9 +1,9 @@
 //! Finds the largest speed at which a vehicle's sections truly pass, to compare it with the advised and planned
 //! speeds.
 //!
-//! A dive passes if nearly all of its sections have the verdict pass, and if no circle without true samples in these
-//! sections exceeds the target. The comparison uses `truth`, which shares nothing with the program's coverage or
-//! advice.
+//! A dive passes if nearly all of its sections have the verdict "pass", and if no circle without true samples
+//! in these sections exceeds the target. The comparison uses `truth`, which shares nothing with the program's
+//! coverage or advice.
 
 use headrace_monitor::advice_log::AdviceEntry;
 use headrace_monitor::messages::Notice;
@@ -53,7 +53,7 @@ pub struct Outing {
 pub struct Outcome {
     /// Fraction of the judged sections that pass, 0 to 1.
     pub passing: f64,
-    /// Fraction of the judged sections with the verdict can't say.
+    /// Fraction of the judged sections with the verdict "can't say".
     pub unsure: f64,
     /// Number of judged sections that pass with a true hole over the target.
     pub falsely: usize,

@@ -483,7 +483,7 @@ impl LineService {
         }
     }
 
-    /// Updates the status of each device. A problem that the line itself reports overrides them.
+    /// Updates the status of each device. A problem that the line itself reports overrides these statuses.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
             let (phase, words) = device.judge(now);

@@ -70,7 +70,7 @@ fn injected_mount_errors_are_estimated() {
     println!("worst error {:.2} sigma, widest sigma {:.2} of what a survey needs", worst.0, worst.1);
 }
 
-/// The beams of the estimated mount point in the directions of the true beams.
+/// The estimated mount's beams have the directions of the true beams.
 #[test]
 fn estimated_mount_has_the_beam_directions_of_the_true_head() {
     let (_, profile) = profiles().into_iter().next().unwrap();

@@ -491,7 +491,7 @@ fn advice(points: &[Point]) -> String {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
-    // A dive without any D gives no finite change.
+    // A dive in which no section has a D gives no finite change.
     let is_known = |point: &&Point| figure(point, "change of D").is_finite();
     let most = left_out().filter(is_known).max_by(|a, b| a.error().total_cmp(&b.error()));
     let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);
