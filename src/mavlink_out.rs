@@ -159,7 +159,7 @@ fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] 
     ]
 }
 
-/// Sends frames as they come. At the end of a dive, the remaining frames are sent first.
+/// Sends frames as they come. At the end of a dive, sends the remaining frames before it returns.
 fn send_all(socket: &UdpSocket, to: &str, frames: &Receiver<Vec<u8>>) {
     let mut failed: u64 = 0;
     for frame in frames {

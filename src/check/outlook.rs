@@ -46,7 +46,7 @@ impl Outlook {
         let (mut heads, mut ids) = (Vec::new(), Vec::new());
         for (sensor, config) in sensors {
             let Some(spec) = sensor.head() else { continue };
-            // With its configured range setting, a head has all of its modes.
+            // Each head offers all of its modes, at its configured range setting.
             heads.push((spec, sensor.modes(None).unwrap_or_default()));
             ids.push(config.id.clone());
         }
