@@ -124,7 +124,7 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
 }
 
-/// Metres by verdict. Metres without a pass come first. Dots stand for omitted ones.
+/// Metres by verdict. Failed, unsure and uninspected metres come first. Dots stand for omitted ones.
 fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let missed = verdict_words(Verdict::Fail).to_uppercase();

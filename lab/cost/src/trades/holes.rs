@@ -324,7 +324,7 @@ impl Setting {
 /// Name of the figure that is a time and not an error.
 const SEARCH: &str = "search or count alone";
 
-/// Judges each section by the T of its lattice, which `t_m` returns.
+/// Judges each section by the spacing T that `t_m` returns for it.
 fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) -> Vec<Judged> {
     let target_m = dive.report.target_m;
     let judged = |section: &JudgedSection| {
