@@ -107,7 +107,7 @@ impl Decoder for Nothing {
 #[derive(Resource, Clone)]
 struct Ends(Arc<Mutex<Vec<(String, Instant)>>>);
 
-/// Adds a system after each stage of a world that records the stage's end.
+/// Adds a system after each stage of a world. The system records the stage's end.
 fn note_stages<S: Stage>(part: &mut Part<S>, ends: &Ends) {
     part.insert_resource(ends.clone());
     for stage in S::ALL {

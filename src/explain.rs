@@ -108,7 +108,7 @@ fn worth_in_json(worth: &EffectInfluence) -> Value {
     })
 }
 
-/// Text on the worth of the effects: first the cheapest sufficient set, then each effect, the most expensive
+/// Text about the worth of the effects: first the cheapest sufficient set, then each effect, the most expensive
 /// first.
 fn worth_in_words(worth: &EffectInfluence) -> String {
     let kept =
@@ -169,7 +169,7 @@ fn called_in_words(called: &[Called]) -> String {
     text
 }
 
-/// Callers of an effect. If there are many, only the first is named.
+/// Reasons that call for an effect, as text. Only the first three are listed.
 fn by(callers: &[String]) -> String {
     const SHOWN: usize = 3;
     let shown = callers.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("; ");

@@ -28,7 +28,7 @@ pub(crate) const DATA_LOST: u8 = 3;
 /// Exit code: the replay differs from the dive.
 pub(crate) const DIVERGED: u8 = 4;
 
-/// Reason for which a command failed.
+/// Reason why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
     #[error("reading {}: {source}", path.display())]

@@ -31,7 +31,7 @@ use crate::follower::Follower;
 const WAITING: usize = 512;
 /// Time that the server has to close its connections.
 const ENDS_WITHIN: Duration = Duration::from_millis(500);
-/// Interval at which an interruption is checked.
+/// Interval at which the thread checks for an interruption.
 const WAIT: Duration = Duration::from_millis(200);
 
 /// A replay that Foxglove may control.
@@ -113,7 +113,8 @@ impl Foxglove {
         Ok(Self { results: Some(sender), thread: Some(thread), is_live, dropped: 0 })
     }
 
-    /// Hands a message to the server's thread. In a live dive, messages without room are dropped and counted.
+    /// Hands a message to the server's thread. In a live dive, messages that find no room in the queue are
+    /// dropped and counted.
     fn send(&mut self, message: Message) {
         let Some(results) = &self.results else { return };
         if self.is_live {

@@ -154,7 +154,7 @@ pub(crate) fn make_room(logs: &[PathBuf], args: &Run, mut claims: Claims) -> Res
     firsts.iter().try_for_each(|first| outputs::make_way(first))
 }
 
-/// Id of each sensor and its connection, or the reason for which `connect` is invalid.
+/// Id of each sensor and its connection, or the reason why `connect` is invalid.
 pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect, ConnectError>)> {
     let sensors = vehicle.sensor_configs.iter().zip(&vehicle.sensors);
     let connect = sensors.map(|(config, device)| {
@@ -252,7 +252,7 @@ impl SensorStates {
         }
     }
 
-    /// Text on a required sensor that isn't running at the deadline, with the sensor's last status.
+    /// Text about a required sensor that isn't running at the deadline, with the sensor's last status.
     fn missing(&self, now: MonoNs) -> Option<String> {
         let number = *self.required.first().filter(|_| now > self.required_by)?;
         let within_s = self.required_by.since(self.begun).as_secs_f64();

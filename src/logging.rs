@@ -85,7 +85,7 @@ static BACKGROUND: OnceLock<Background> = OnceLock::new();
 
 /// From now on no thread waits for stderr. If nobody reads stderr, a dive and its recorder continue.
 ///
-/// Lines without room are dropped and counted.
+/// Lines that find no room in the queue are dropped and counted.
 pub(crate) fn never_wait() {
     let (lines, queue) = bounded(WAITING);
     // If the thread can't be started, all lines are dropped as soon as the queue is full.

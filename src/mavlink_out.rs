@@ -18,9 +18,9 @@ use headrace_monitor::run::Loop;
 use crate::failure::Failure;
 use crate::follower::Follower;
 
-/// Interval of heartbeats, in the loop's time. Source: MAVLink, "Heartbeat/Connection Protocol".
+/// Interval between heartbeats, in the loop's time. Source: MAVLink, "Heartbeat/Connection Protocol".
 const HEARTBEAT_EVERY: DurNs = DurNs(1_000_000_000);
-/// Interval of the figures, in the loop's time.
+/// Interval between the figures, in the loop's time.
 const FIGURES_EVERY: DurNs = DurNs(500_000_000);
 /// Maximum number of frames that wait. It corresponds to about ten seconds.
 const WAITING: usize = 256;
@@ -58,7 +58,8 @@ impl MavlinkOut {
         })
     }
 
-    /// Hands a frame to the sending thread. A frame without room is dropped, since a newer one follows.
+    /// Hands a frame to the sending thread. A frame that finds no room in the queue is dropped, since a newer
+    /// one follows.
     fn send(&self, frame: Vec<u8>) {
         if let Some(frames) = &self.frames {
             frames.try_send(frame).ok();
@@ -158,7 +159,7 @@ fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] 
     ]
 }
 
-/// Sends frames as they come. At the end of a dive, the remaining frames are sent first.
+/// Sends frames as they come. At the end of a dive, sends the remaining frames before it returns.
 fn send_all(socket: &UdpSocket, to: &str, frames: &Receiver<Vec<u8>>) {
     let mut failed: u64 = 0;
     for frame in frames {

@@ -53,7 +53,7 @@ fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
     found.voices.iter().map(name).collect()
 }
 
-/// Texts on voice notes whose recordings are missing in the log.
+/// Texts about voice notes whose recordings are missing in the log.
 fn missing(found: &LoggedNotes) -> Vec<String> {
     let lacks = |note: &NoteJson| {
         let voice = note.voice.as_ref().filter(|voice| voice.seconds.is_some())?;

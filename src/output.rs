@@ -17,7 +17,7 @@ use crate::terminal;
 
 /// Time for which a live dive waits while nobody reads stdout.
 pub(crate) const UNREAD_FOR: Duration = Duration::from_secs(2);
-/// Number of bytes that any reader takes within [`UNREAD_FOR`].
+/// Length of one write, bytes. Any active reader takes this many within [`UNREAD_FOR`].
 const PIECE: usize = 1 << 10;
 
 /// Whether stdout has been given up. Nothing more is written to it then.
@@ -39,7 +39,8 @@ pub(crate) fn never_wait() {
     NEVER_WAITS.store(true, Ordering::Relaxed);
 }
 
-/// Stdout for one piece of output that no separate thread writes. It is flushed once, at the end.
+/// Opens stdout for one piece of output, which is flushed once, at the end. After [`never_wait`], a caller
+/// waits for at most [`UNREAD_FOR`].
 ///
 /// Errors: stdout has been given up.
 fn stdout() -> io::Result<Box<dyn Write>> {

@@ -1,5 +1,5 @@
-//! Checks before the work whether a command may overwrite its output files and can write them. Claims keep the outputs
-//! of a command different from its inputs and from one another.
+//! Checks, before the work begins, whether a command may overwrite its output files and can write them. Claims
+//! keep the outputs of a command different from its inputs and from one another.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Read, Seek as _, SeekFrom};
@@ -49,7 +49,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Reason for which a file of another kind is not overwritten.
+    /// Reason why a file of another kind is not overwritten.
     fn refusal(self) -> &'static str {
         match self {
             Self::Report => "isn't a report",
@@ -114,7 +114,7 @@ fn ends(path: &Path, mark: &str) -> bool {
     end().unwrap_or(false)
 }
 
-/// Checks before the work that a file may be overwritten and can be written. The file isn't changed.
+/// Checks, before the work begins, that a file may be overwritten and can be written. The file isn't changed.
 ///
 /// Errors: the existing file is of another kind and there is no `--force`, or the file can't be written or
 /// created.
@@ -185,7 +185,8 @@ impl Claims {
         Self { force: overwrite.force, inputs: inputs.into_iter().collect(), outputs: Vec::new() }
     }
 
-    /// Checks before the work that a file may be overwritten and can be written. The file isn't changed.
+    /// Checks, before the work begins, that a file may be overwritten and can be written. The file isn't
+    /// changed.
     ///
     /// Errors: the command reads the file or already writes it, the existing file is of another kind and
     /// there is no `--force`, or the file can't be written or created.

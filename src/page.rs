@@ -43,7 +43,7 @@ use crate::logging::complain;
 use crate::recording_state::RecordingState;
 use crate::report_output::exit_code;
 
-/// Interval at which an interruption is checked while a replay is paused.
+/// Interval at which a paused replay checks for an interruption.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Name of a BlueOS machine.
 const BLUEOS: &str = "blueos.local";
@@ -86,7 +86,7 @@ pub(crate) struct Served {
     commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>>,
 }
 
-/// Whether to serve a page: it was requested, or a person watches on a terminal.
+/// Whether to serve a page: true if it was requested, or if a person watches on a terminal.
 pub(crate) fn is_wanted(args: &PageArgs, is_watched: bool) -> bool {
     !args.no_page && (args.page.is_some() || is_watched && std::io::stdout().is_terminal())
 }

@@ -23,13 +23,14 @@ pub(crate) struct Printer {
     thread: Option<JoinHandle<()>>,
     /// Channel that is disconnected when the thread has written all lines.
     done: Receiver<()>,
-    /// Whether lines without room are dropped, instead of waiting.
+    /// Whether lines that find no room in the queue are dropped. Otherwise the caller waits.
     lossy: bool,
     dropped: u64,
 }
 
 impl Printer {
-    /// Starts the thread. A `lossy` printer never waits. It drops and counts lines without room.
+    /// Starts the thread. A `lossy` printer never waits. It drops and counts lines that find no room in the
+    /// queue.
     pub(crate) fn start(lossy: bool) -> Self {
         let (sender, messages) = bounded(WAITING);
         // If the thread can't be started, all lines are dropped, and the end of the dive reports that.

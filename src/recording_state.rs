@@ -2,7 +2,7 @@
 
 use headrace_geometry::time::DurNs;
 
-/// Time since the last sync from which screens show it, and from which it is an alarm.
+/// Time since the last sync at which screens begin to show it, and at which it becomes an alarm.
 pub(crate) const SHOWN_FROM: DurNs = DurNs(2_000_000_000);
 pub(crate) const ALARM_FROM: DurNs = DurNs(5_000_000_000);
 

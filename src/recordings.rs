@@ -128,7 +128,7 @@ impl One {
     }
 }
 
-/// Texts on data missing in a recording, and on errors while it was recorded.
+/// Texts about data missing in a recording, and about errors while it was recorded.
 fn unrecorded(written: &Summary) -> Vec<String> {
     let mut losses: Vec<String> = written.faults.iter().map(fault).collect();
     losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
@@ -142,14 +142,14 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     losses
 }
 
-/// Text on an error of the recording, with times.
+/// Text about an error of the recording, with times.
 fn fault(fault: &RecordingFault) -> String {
     let from = fault.from.map(|from| format!(", after {}", seconds(from)));
     let to = fault.to.map(|to| format!(", before {}", seconds(to)));
     [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
 }
 
-/// Text on data that the recorder has dropped, with times.
+/// Text about data that the recorder has dropped, with times.
 fn left_out(left: LeftOut) -> String {
     let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
     format!("{}{}", left.words(), span.unwrap_or_default())

@@ -12,7 +12,7 @@ use headrace_monitor::report::{DiveReport, NotInspectedReport, Report, RunReport
 
 use crate::terminal;
 
-/// Duration of a sensor's silence from which it is reported, s.
+/// Shortest silence of a sensor that is reported, s.
 const SILENT_S: f64 = 5.0;
 /// Maximum number of notes listed.
 const MOST_NOTES: usize = 20;
@@ -118,7 +118,7 @@ fn spacing(report: &Report) -> String {
     )
 }
 
-/// Text on a sensor's packets that were dropped before they were read.
+/// Text about a sensor's packets that were dropped before they were read.
 fn dropped(source: &SourceReport) -> Option<String> {
     let count = source.line.as_ref()?.dropped_packets;
     let line = format!(
@@ -128,7 +128,7 @@ fn dropped(source: &SourceReport) -> Option<String> {
     (count > 0).then_some(line)
 }
 
-/// Text on a sensor's silence, if it deserves a line.
+/// Text about a sensor's silence, if it deserves a line.
 ///
 /// If a dive has no position or no sonar, another line names the silent sensors.
 fn silence(source: &SourceReport) -> Option<String> {
@@ -143,7 +143,7 @@ fn silence(source: &SourceReport) -> Option<String> {
     }
 }
 
-/// Text on the reason for which a dive is no inspection.
+/// Text that explains why a dive is no inspection.
 fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     let lacking = why
         .missing
@@ -167,7 +167,8 @@ fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     }
 }
 
-/// Text on a dive that was never within the tunnel. It has the places of the heads, and settings to check.
+/// Text about a dive that was never within the tunnel. It states the positions of the heads, and the settings
+/// to check.
 fn outside_text(dive: &DiveReport) -> String {
     let place = match (dive.from_m, dive.to_m) {
         (Some(from_m), Some(to_m)) => format!(" from {} to {}", station(from_m), station(to_m)),
@@ -182,7 +183,7 @@ fn metres(judged: &OtherTargetReport) -> String {
     metres_text(&LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
 }
 
-/// Lines on the missed and the unsure stretches, in the order of chainage: place, problem and action.
+/// Lines about the missed and the unsure stretches, in the order of chainage: place, problem and action.
 fn stretches(report: &Report) -> Vec<String> {
     let fails = |run: &&RunReport| {
         let mut within =
@@ -248,7 +249,7 @@ pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// Lines on the effect of smoothing: metres by verdict, and a line per run of neighbouring sections with the
+/// Lines about the effect of smoothing: metres by verdict, and a line per run of neighbouring sections with the
 /// same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;

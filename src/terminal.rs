@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Capabilities of an output stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Terminal {
-    /// Whether colours are shown: on a terminal with neither `NO_COLOR` nor `TERM=dumb`.
+    /// Whether colours are shown: true on a terminal, unless `NO_COLOR` or `TERM=dumb` is set.
     pub(crate) colour: bool,
-    /// Whether lines can overwrite themselves: on a terminal without `TERM=dumb`.
+    /// Whether a printed line can be overwritten: true on a terminal, unless `TERM=dumb` is set.
     pub(crate) overwrites: bool,
 }
 

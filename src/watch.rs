@@ -19,9 +19,9 @@ use crate::recording_state::RecordingState;
 use crate::screen::Screen;
 use crate::terminal;
 
-/// Interval of state lines if they can't be overwritten.
+/// Interval between state lines if they can't be overwritten.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
-/// Interval of state lines that are overwritten, and of states in JSON.
+/// Interval between state lines that are overwritten, and between states in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
 /// Minimum time after the last state line before a changed lamp colour gives a new line. It applies if lines
 /// can't be overwritten.

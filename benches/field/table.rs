@@ -46,8 +46,8 @@ pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
     cells
 }
 
-/// Whether the table contains a cell. Wrong settings and broken devices run at one place only, unless selected. A
-/// single vehicle drives from the launch to the far place.
+/// Whether the table contains a cell. Cells with wrong settings or broken devices run at one place only, unless
+/// they are selected. A single vehicle drives from the launch to the far place.
 fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, speed]: [&str; 2]) -> bool {
     if place == DRIVEN_THERE.0 {
         return vehicle.name == "vita2-4" && condition == Condition::DataSheet && speed == "planned";

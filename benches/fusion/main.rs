@@ -75,7 +75,7 @@ fn in_turns<const K: usize>(mut works: [Work<'_>; K]) -> [f64; K] {
     best
 }
 
-/// Runs `step` on a copy of `start`, which is renewed at intervals.
+/// Runs `step` on a copy of `start`. The copy is renewed at intervals.
 fn from_a_start<T: Clone>(start: &T, runs: u32, mut step: impl FnMut(&mut T)) {
     for _ in 0..runs / RUNS_FROM_ONE_START {
         let mut value = start.clone();

@@ -25,7 +25,7 @@ pub(crate) struct Window {
     pub(crate) at_surface_s: Option<[f64; 2]>,
 }
 
-/// Reason for which readings can't be collected.
+/// Reason why readings can't be collected.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum CollectError {
@@ -152,7 +152,7 @@ pub(crate) struct Material<'a> {
 }
 
 impl<'a> Material<'a> {
-    /// Readings received from `from` until before `to`, each with its sensor.
+    /// Readings received from `from` (inclusive) to `to` (exclusive), each with its sensor.
     pub(crate) fn during(
         &self,
         from: MonoNs,

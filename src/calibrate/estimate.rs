@@ -18,7 +18,7 @@ impl Estimate {
     }
 }
 
-/// Reason for which a quantity can't be estimated from this log.
+/// Reason why a quantity can't be estimated from this log.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum NotEstimated {

@@ -12,7 +12,7 @@ use crate::calibrate::still::longest;
 use crate::calibrate::timing::{Lag, lags};
 use crate::calibrate::zero::{self, Zero};
 
-/// Result of each estimator, or the reason for which it has none.
+/// Result of each estimator, or the reason why it has none.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Findings {
     /// Mounts of the heads.

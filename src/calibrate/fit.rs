@@ -31,8 +31,8 @@ const PLACE_SD_M: f64 = 10.0;
 ///
 /// Source: data sheets of MEMS units, static accuracy 0.2 degrees.
 const TILT_SD_RAD: f64 = 0.2 * DEGREE;
-/// Relative standard deviation of a speed of sound from tables. It corresponds to 1 degree of water
-/// temperature.
+/// Relative standard deviation of a speed of sound from tables. It corresponds to an error of 1 degree in the
+/// water temperature.
 const SCALE_SD: f64 = 0.003;
 /// Standard deviation of the angle of a mount in a vehicle file, radians.
 ///
@@ -44,8 +44,8 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
 /// Minimum standard deviation assumed for returns, m. Walls are at least this rough.
 const LEAST_SCALE_M: f64 = 0.01;
-/// Residuals are weighted less beyond `HUBER` scales, and rejected beyond `TUKEY` scales. Source: the usual
-/// constants of Huber and Tukey.
+/// Residuals beyond `HUBER` robust standard deviations get less weight. Residuals beyond `TUKEY` of them are
+/// rejected. Source: the usual constants of Huber and Tukey.
 const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
 /// Number of rounds with Huber's weights. Tukey's weights need a good start.
@@ -58,7 +58,7 @@ const MISSED_COST: f64 = 4.5;
 ///
 /// It is high, because there are few echosounders and they distinguish the sides.
 const MOST_ECHO_COST: f64 = 100.0;
-/// Largest rotation of a head in one round, radians.
+/// Largest change of a head's angle in one round of the fit, radians.
 const MOST_STEP_RAD: f64 = 0.2;
 
 /// Input of a fit.
@@ -150,7 +150,8 @@ impl Problem<'_> {
     pub(crate) fn fit<const N: usize>(&self, start: [f64; N], rounds: usize) -> Fit<N> {
         let known = self.known::<N>();
         let mut prior = start;
-        // The prior of the position is the start of the fit. All other priors are the file's values.
+        // The prior of the position is centred on the start of the fit. All other priors are centred on the
+        // file's values.
         prior.iter_mut().skip(2).for_each(|slot| *slot = 0.0);
         let mut x = start;
         let mut factors = Factors::independent(known.map(|sd| sd * sd));
@@ -248,7 +249,8 @@ impl Problem<'_> {
         Some((h, row.residual))
     }
 
-    /// Range update as in the navigation filter, with derivatives by the unknowns common to all sonars.
+    /// Range update as in the navigation filter, with its derivatives with respect to the unknowns common to
+    /// all sonars.
     fn common_row<const N: usize>(
         &self,
         x: &[f64; N],
@@ -329,7 +331,7 @@ fn weight(off: f64, is_near: bool) -> f64 {
     }
 }
 
-/// Whether a residual of this size, m, is an outlier at this scale, m.
+/// Whether a residual of this size, m, is an outlier if the robust standard deviation is `scale_m`.
 pub(crate) fn is_outlier(off_m: f64, scale_m: f64) -> bool {
     off_m.abs() > TUKEY * scale_m
 }

@@ -1,4 +1,4 @@
-//! Finds the time for which the vehicle stood still, second by second.
+//! Finds the longest period in which the vehicle stood still, in steps of one second.
 //!
 //! Attitude, cable, depth and echosounders show whether it moved.
 
@@ -54,7 +54,7 @@ impl Sign {
 pub(crate) struct Still {
     /// First receive time.
     pub(crate) from: MonoNs,
-    /// Time before which the last reading was received.
+    /// End of the period, exclusive. All readings were received before this time.
     pub(crate) to: MonoNs,
 }
 

@@ -122,7 +122,7 @@ impl Table {
         self.open.push(Open { of: of.to_owned(), what, why });
     }
 
-    /// Adds a number, or the reason for which there is none. Returns whether the file should be changed.
+    /// Adds a number, or the reason why there is none. Returns whether the file should be changed.
     fn number(
         &mut self,
         of: &str,

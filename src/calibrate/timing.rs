@@ -15,9 +15,9 @@ use headrace_sensor::device::SensorKind;
 /// Search range of time offsets to either side, and the step of the search, s.
 const REACH_S: f64 = 0.2;
 const COARSE_S: f64 = 0.1;
-/// Allowed steps around the best offset, s.
+/// Limits of the step between the offsets tried around the best one, s.
 ///
-/// A step is at most two standard deviations, unless the curve is nearly flat or rough.
+/// Within these limits, the step is two standard deviations of the best offset.
 const FINE_S: core::ops::RangeInclusive<f64> = 0.01..=0.05;
 /// Gain in likelihood above which a source is corrected before the others are examined. It corresponds to
 /// five standard deviations.
@@ -104,8 +104,8 @@ pub(crate) fn lags(
 
 /// Widens all standard deviations if a source seems early by several of its standard deviations.
 ///
-/// No source is early. The cause is then something other than a time offset, such as a beam narrower than
-/// assumed, or a mount.
+/// No source can really be early. The cause is then something other than a time offset, such as a beam narrower
+/// than assumed, or a mount.
 fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
     let early = |lag: &Lag| {
         let latency_s = latencies.get(lag.source).map_or(0.0, |latency| latency.as_secs_f64());
@@ -134,7 +134,7 @@ struct Runs<'a, 'b> {
     material: &'a Material<'a>,
     events: &'a [Event],
     shifts_s: Vec<f64>,
-    /// Whether the likelihood of each source was clearly best at the late end of the search range.
+    /// Whether each source's likelihood was clearly largest at the late end of the search range.
     later: Vec<bool>,
     /// Share of measurements gated in the last run.
     gated: f64,
@@ -175,7 +175,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         self.later.get(source).copied().unwrap_or(false)
     }
 
-    /// The offset, unless the device would then answer after its next request.
+    /// Returns the offset. It is an error if the device would then answer after its next request.
     fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, NotEstimated> {
         let answers = |kind: SensorKind| matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
         let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));

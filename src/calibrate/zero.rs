@@ -27,7 +27,8 @@ pub(crate) struct Zero {
     pub(crate) readings: usize,
 }
 
-/// Pressure at the surface, Pa: mean of the first depth sensor from `from` until before `to`.
+/// Pressure at the surface, Pa: mean of the first depth sensor's readings from `from` (inclusive) to `to`
+/// (exclusive).
 ///
 /// The standard deviation is that of one reading, since waves and drift don't average out.
 ///

@@ -8,11 +8,12 @@ use serde_json::{Value, json};
 
 /// Accuracy of the cable's chainage, for a vehicle with a counter and the filter.
 pub(super) struct Cable {
-    /// Smallest change of the chainage, m; `None` if each reading has its own step.
+    /// Step of the counter, m; `None` if each reading states its own step.
     step_m: Option<f64>,
     /// Standard deviation of the slack, m, and its time constant, s.
     slack: [f64; 2],
-    /// Speed, m/s, standard deviation of a hole at this speed, and largest hole that passes, m.
+    /// A speed, m/s. Then, at this speed, the standard deviation of a hole's diameter and the largest hole that
+    /// passes, m.
     ///
     /// The speed is the planned one, or else the largest one.
     at_speed: Option<[f64; 3]>,

@@ -1,4 +1,4 @@
-//! Outlook: largest speed, hours and hidden wall, as planned from a vehicle file.
+//! Outlook for a vehicle file: the largest speed, the hours of a dive, and the wall that the vehicle hides.
 
 use headrace_sampling::SamplingError;
 use headrace_sampling::head::HeadMode;
@@ -9,9 +9,9 @@ use serde_json::{Value, json};
 
 /// Plan for a file as it is. The vehicle is on the tunnel's axis.
 pub(super) struct Outlook {
-    /// Answer for the mode that all heads have; `None` if their modes differ.
+    /// The planner's answer for the mode that all heads have; `None` if their modes differ.
     own: Option<Answer>,
-    /// Answer with the largest speed.
+    /// The planner's answer with the largest speed.
     best: Option<Answer>,
     /// Largest speed, m/s, if the heads are set in phase for the planned speed.
     ///
@@ -26,8 +26,8 @@ pub(super) struct Outlook {
     length_m: f64,
 }
 
-/// Relative difference below which two speeds are reported as one. It is the advice's margin for measuring
-/// the speed.
+/// Relative difference below which two speeds are reported as one. It equals the margin that the advice keeps
+/// for errors of the measured speed.
 const TOLD_APART: f64 = 0.02;
 /// Relative difference below which two turn periods are equal.
 const SAME: f64 = 1e-6;
@@ -46,7 +46,7 @@ impl Outlook {
         let (mut heads, mut ids) = (Vec::new(), Vec::new());
         for (sensor, config) in sensors {
             let Some(spec) = sensor.head() else { continue };
-            // With its configured range setting, a head has all of its modes.
+            // Each head offers all of its modes, at its configured range setting.
             heads.push((spec, sensor.modes(None).unwrap_or_default()));
             ids.push(config.id.clone());
         }
@@ -152,7 +152,7 @@ impl Outlook {
         lines
     }
 
-    /// Text on the wall that the vehicle hides from some or all heads.
+    /// Text about the wall that the vehicle hides from some or all heads.
     fn hidden_line(&self) -> String {
         if self.hidden.is_empty() {
             return "every head sees all of the wall".to_owned();
@@ -203,7 +203,7 @@ impl Outlook {
     }
 }
 
-/// Speed for computing results that don't depend on the speed, m/s.
+/// Arbitrary speed for results that don't depend on the speed, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 /// A speed rounded down to 1 mm/s. The printed speed thus meets the target, too.

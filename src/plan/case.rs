@@ -221,7 +221,7 @@ pub(super) struct Findings {
     /// Mode for the briefing and the charts, with its speed, m/s; `None` if no mode gives a speed.
     pub(super) shown: Option<(usize, f64)>,
     pub(super) briefing: Briefing,
-    /// Gain in speed with heads in line, if it is worth reporting.
+    /// Gain in speed with the heads in one line along the hull, if it is worth reporting.
     pub(super) in_line: Option<InLine>,
 }
 

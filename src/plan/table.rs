@@ -224,7 +224,7 @@ fn best_words(best: &Answer) -> String {
     }
 }
 
-/// Text on the speed that each margin costs.
+/// Text about the speed that each margin costs.
 fn margin_words(mode: &str, margins: &Margins) -> String {
     /// Cost of a margin, m/s, below which it isn't printed, because the rounded speeds would not show it.
     const NOTHING_MPS: f64 = 5e-4;
@@ -248,7 +248,7 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
     words.join(", ")
 }
 
-/// Text on the gain in speed with heads in line.
+/// Text about the gain in speed with the heads in one line along the hull.
 fn in_line_words(findings: &Findings, in_line: &InLine) -> String {
     let InLine { positions_m, mode, v_max_mps, .. } = in_line;
     let hours = findings.planner.inspection().length_m / v_max_mps / 3600.0;
@@ -261,7 +261,7 @@ fn in_line_words(findings: &Findings, in_line: &InLine) -> String {
     )
 }
 
-/// Text on occlusion by the vehicle, and on strips of wall with fewer passes.
+/// Text about occlusion by the vehicle, and about strips of wall with fewer passes.
 fn hidden_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let names = |heads: &[usize]| names(findings, heads);
     let hidden = briefing.hidden.iter().map(|hidden| {
@@ -282,8 +282,8 @@ fn names(findings: &Findings, heads: &[usize]) -> String {
     heads.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
-/// Text on start angles, on interference between heads, and on distances along the hull that allow equal
-/// start angles.
+/// Text about start angles, interference between heads, and distances along the hull that allow equal start
+/// angles.
 fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let names = |heads: &[usize]| names(findings, heads);
     let mut lines = Vec::new();

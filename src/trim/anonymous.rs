@@ -22,7 +22,7 @@ pub(crate) struct Anonymous {
     vehicle_toml: String,
     /// Old and new names of attachments.
     names: Vec<(String, String)>,
-    /// Text on items that couldn't be removed.
+    /// Messages that list the items that couldn't be removed.
     pub(crate) left: Vec<String>,
 }
 
@@ -64,7 +64,7 @@ impl Anonymous {
     }
 }
 
-/// Texts on items that can't be removed.
+/// Messages that list the items that can't be removed.
 fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
     let info = log.header();
     let ids = |sources: &[SourceInfo]| {

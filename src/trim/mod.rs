@@ -132,7 +132,7 @@ fn when_within(
     Ok(spans)
 }
 
-/// Text on the changes to the log.
+/// Text about the changes to the log.
 fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> Result<Vec<String>, Failure> {
     let mut said = Vec::new();
     if args.anonymise {

@@ -43,7 +43,7 @@ pub(super) struct ScreenFrame {
     pub(super) alerts: Vec<AlertRow>,
     /// Number of alerts left out.
     pub(super) alerts_hidden: usize,
-    /// Text on the recordings, and whether it is an alarm.
+    /// Text about the recordings, and whether it is an alarm.
     pub(super) recording: Option<(String, bool)>,
     pub(super) wall: WallNews,
     /// Messages since the last frame, oldest first.
@@ -206,7 +206,7 @@ impl FrameBuilder {
     }
 }
 
-/// Text on the reason that limits the speed, unless the condition states it already.
+/// Text about the reason that limits the speed, unless the condition states it already.
 fn reason_text(
     advice: &Advice,
     state: &LiveState,

@@ -15,7 +15,7 @@ pub(crate) enum Mode {
     Replay(Sender<PlaybackCommand>, Option<f64>),
 }
 
-/// Reason for which a replay is stopped.
+/// Reason why a replay is stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stop {
     Paused,

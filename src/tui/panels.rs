@@ -19,7 +19,7 @@ use crate::output::append;
 
 /// Number of rows of the clock strips.
 pub(super) const CLOCK_ROWS: usize = HOURS;
-/// Columns of a sensor's lamp with the age of its data, and without it.
+/// Width of a sensor's entry with and without the age of its data, columns.
 const LAMP_COLUMNS: [usize; 2] = [24, 19];
 /// Width of the strips' labels.
 const LABEL: usize = 6;
@@ -124,7 +124,7 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
 }
 
-/// Metres by verdict, with those that haven't passed first. Dots stand for omitted ones.
+/// Metres by verdict. Failed, unsure and uninspected metres come first. Dots stand for omitted ones.
 fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let missed = verdict_words(Verdict::Fail).to_uppercase();
@@ -352,7 +352,7 @@ fn known_style(known: Known, ink: Palette) -> Style {
     }
 }
 
-/// Mark for a hole. Its height is in eighths, and half of it is the target.
+/// Bar for a hole. Half of the full height stands for the target, and the full bar has eight steps.
 fn hole_mark(cell: Cell, ink: Palette) -> (char, Style) {
     let Some(share) = cell.share else {
         return (if cell.known == Known::Unseen { '·' } else { ' ' }, Palette::dim()).ascii(ink);
@@ -406,7 +406,7 @@ impl Ascii for (char, Style) {
     }
 }
 
-/// Text with stations, each at its column below a strip.
+/// Text of the ruler: chainages, each at its column below a strip.
 fn ruler_text(strip: &Strip) -> String {
     let mut text = " ".repeat(LABEL);
     let mut column = 0;

@@ -104,7 +104,7 @@ impl Cell {
     }
 }
 
-/// Data on the wall within a frame.
+/// Data about the wall within a frame.
 pub(super) struct WallNews {
     pub(super) section_m: f64,
     pub(super) count: usize,
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn column_shows_its_worst_section_and_hours_covered_in_all_its_sections() {
+    fn column_shows_its_worst_section_and_the_clock_hours_that_all_its_sections_cover() {
         let strip = wall(100, 2.0).strip(Extent::Tunnel, 50);
         assert_eq!((strip.columns.len(), strip.column_m), (50, 1.0));
         let first = strip.columns[0].unwrap();

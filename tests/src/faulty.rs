@@ -83,7 +83,7 @@ impl End {
         Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
     }
 
-    /// An end on the line of the previous sensor, which has the end `other`.
+    /// An end on the line of the previous sensor, whose own end is `other`.
     pub fn beside(other: &Self) -> Self {
         Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
     }
@@ -198,7 +198,7 @@ impl Wire {
         }
     }
 
-    /// Adds frames that were sent whole in another way to the count.
+    /// Adds to the count of whole frames those that were sent by other means than [`Wire::whole`].
     pub fn count(&self, frames: u64) {
         self.control.whole.fetch_add(frames, Ordering::SeqCst);
     }

@@ -25,7 +25,7 @@ pub const PARTS: u32 = 16;
 /// Tolerance of the chainage that all heads have passed, m. The program updates this chainage five times a second,
 /// and takes the farthest wall as the reach of a tilted head.
 pub const NEAR_M: f64 = 0.12;
-/// A shorter backward motion counts as sway, m.
+/// Length below which a backward motion counts as sway, m.
 const WAY_BACK_M: f64 = 0.05;
 
 /// Reach of the heads at a moment.

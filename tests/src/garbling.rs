@@ -34,7 +34,7 @@ pub struct Garbled {
 }
 
 impl Garbled {
-    /// Passes all bytes through `change`. `count` counts the frames that stay good.
+    /// Passes all bytes through `change`. `count` counts the frames that are still good after the change.
     pub fn new(seed: u64, count: Count, change: fn(&mut Random, &[u8]) -> Vec<u8>) -> Self {
         Self { random: Random(seed), change, count }
     }

@@ -77,7 +77,7 @@ impl Dive {
 #[derive(Default)]
 struct Seen {
     pings: Vec<Ping>,
-    /// Place of every return. The loop may decide later whether a return is wall or doubtful.
+    /// Place of every return. The loop may decide later whether the return is from the wall or doubtful.
     placed: Vec<Option<[f64; 3]>>,
     /// Source of each ping.
     sources: Vec<SourceId>,

@@ -1,9 +1,9 @@
 //! Finds the largest speed at which a vehicle's sections truly pass, to compare it with the advised and planned
 //! speeds.
 //!
-//! A dive passes if nearly all of its sections have the verdict pass, and if no circle without true samples in these
-//! sections exceeds the target. The comparison uses `truth`, which shares nothing with the program's coverage or
-//! advice.
+//! A dive passes if nearly all of its sections have the verdict "pass", and if no circle without true samples
+//! in these sections exceeds the target. The comparison uses `truth`, which shares nothing with the program's
+//! coverage or advice.
 
 use headrace_coverage::Verdict;
 use headrace_monitor::advice_log::AdviceEntry;
@@ -17,7 +17,7 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// Start of a dive that isn't judged, s. In this time, the filter learns the biases of the inertial unit.
+/// Unjudged period at the start of a dive, s. In this time, the filter learns the biases of the inertial unit.
 const SETTLES_S: f64 = 100.0;
 /// Length that is judged, m.
 const JUDGED_M: f64 = 8.0;
@@ -44,8 +44,8 @@ pub struct Outing {
     pub seed: u64,
     /// Chainage of the start, m.
     pub start_m: f64,
-    /// Fraction of the planned speed for which the heads are in phase, and at which the vehicle drives before the
-    /// first advice.
+    /// A speed, as a fraction of the planned speed. The heads are in phase for it, and the vehicle drives at it
+    /// before the first advice.
     pub planned_share: f64,
 }
 
@@ -54,7 +54,7 @@ pub struct Outing {
 pub struct Outcome {
     /// Fraction of the judged sections that pass, 0 to 1.
     pub passing: f64,
-    /// Fraction of the judged sections with the verdict can't say.
+    /// Fraction of the judged sections with the verdict "can't say".
     pub unsure: f64,
     /// Number of judged sections that pass with a true hole over the target.
     pub falsely: usize,
@@ -80,12 +80,12 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// Ratio of two speeds: the advice to a vehicle at the planned speed, and the true largest speed.
+    /// Speed advised to a vehicle at the planned speed, divided by the true largest speed.
     pub fn ratio(&self) -> f64 {
         self.over_true(self.advised_mps)
     }
 
-    /// Ratio of two speeds: the advice to a pilot who follows it, and the true largest speed.
+    /// Speed advised to a pilot who follows the advice, divided by the true largest speed.
     pub fn followed_ratio(&self) -> f64 {
         self.over_true(self.followed.told_mps())
     }

@@ -27,7 +27,7 @@ use crate::drops;
 use crate::faulty::{Control, End, Fault, Faulty};
 use crate::patient::Patient;
 
-/// Longest wait, also on a busy machine; a test that takes longer hangs.
+/// Longest wait. Even on a busy machine, only a test that hangs waits longer.
 const LONG: DurNs = DurNs::from_millis(300_000);
 
 /// Vehicle file without its sensors.

@@ -22,7 +22,7 @@ pub struct Spacing {
     pub t_x_m: [Option<f64>; 2],
     /// T_y: distance to the previous sample of the same head.
     pub t_y_m: Option<f64>,
-    /// T from T_x and T_y, without and with the end points of series.
+    /// Spacing T from T_x and T_y, without and with the end points of series.
     pub t_m: [Option<f64>; 2],
 }
 

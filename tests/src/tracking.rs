@@ -133,7 +133,7 @@ struct RecordedNavigation<N> {
     said: SyncSender<Said>,
 }
 
-/// A snapshot excludes the records.
+/// The records are not part of a snapshot.
 impl<N: Transparent> Stateful for RecordedNavigation<N> {
     fn save(&self, to: &mut Saver) {
         self.inner.save(to);

@@ -220,7 +220,7 @@ impl Trade {
         self.error_axis.rsplit(", ").next().unwrap_or_default()
     }
 
-    /// Largest difference of the error that counts as no difference, in the unit of the error.
+    /// Difference of two errors up to which they count as equal, in the unit of the error.
     ///
     /// This is a tenth of the deciding error, and at least the reference's own error.
     pub fn resolution(&self) -> f64 {
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn method_slower_and_no_more_accurate_is_off_the_pareto_front() {
+    fn slower_method_without_better_accuracy_is_off_the_pareto_front() {
         let mut points = [
             point("fine", 0.01, [9.0, 10.0, 11.0]),
             point("fine but slow", 0.01, [90.0, 100.0, 110.0]),
@@ -368,7 +368,8 @@ mod tests {
         front(&mut points, 0.0);
         assert_eq!(knee(&points, "s", 0.0).map(|point| point.value.as_str()), Some("knee"));
         assert!(knee(&points[..2], "s", 0.0).is_none() && knee(&points, "another", 0.0).is_none());
-        // Otherwise the finest point and the knee have the same error, and the cheaper one becomes an end of the front.
+        // At this resolution the finest point and the knee have equal errors, so the cheaper one becomes an end
+        // of the front.
         assert_eq!(knee(&points, "s", 0.02).map(|point| point.value.as_str()), Some("near the line"));
         assert!(knee(&points, "s", 0.2).is_none());
     }

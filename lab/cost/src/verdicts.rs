@@ -5,9 +5,10 @@ use headrace_coverage::Verdict;
 use crate::point::{Error, Interval, quantile};
 use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
-/// Length at each end of a dive, beyond the target, in which sections have neighbours on one side only, m.
+/// Length that is left out at each end of a dive, in addition to a length equal to the target, m.
 ///
-/// This is the length of the hull plus the distance to the next pass.
+/// Sections there have neighbours on one side only. The length is that of the hull plus the distance to the
+/// next pass.
 pub const END_M: f64 = 2.0;
 
 /// A section as judged by a method, with its true hole.

@@ -93,7 +93,7 @@ fn page_in_docs_matches_its_data() {
 
 /// Among sections whose D_true is over the target, the shipped defaults may pass only a small share.
 #[test]
-fn shipped_defaults_pass_few_sections_over_the_target() {
+fn shipped_defaults_falsely_pass_few_sections() {
     let text = std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap();
     let results: Results = serde_json::from_str(&text).unwrap();
     let mut told = 0;

@@ -89,7 +89,7 @@ fn ticks_change_no_verdict_but_coarse_profiles_change_the_advice() {
 }
 
 #[test]
-fn result_without_omitted_effects_is_unchanged_and_converges_with_more_rays() {
+fn only_omitted_effects_change_the_result_and_more_rays_reduce_the_change() {
     let trade = measured(simulation::measure);
     is_whole(&trade);
     for scene in ["boulders", "small pipe"] {

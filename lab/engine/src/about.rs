@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn dives_csv_overrides_the_path() {
+    fn dives_csv_overrides_facts_from_the_path() {
         let all =
             Abouts::parse("dives.csv", "log, pilot,day\na/x.mcap,Ada,1970-01-03\n\"b,c.mcap\",,\n").unwrap();
         let of = |log: &str, us| all.of(log, us);

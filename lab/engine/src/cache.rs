@@ -2,8 +2,8 @@
 //!
 //! The files are `CACHE/VERSION/PARAMETERS/DIVE/sections.parquet` and so on. A dive's folder is built elsewhere and
 //! then renamed. It therefore exists completely or not at all, even if a process is killed. The folder's `whole.json`
-//! has the length and digest of each file. A dive is made again if a file differs from its digest. `CACHE/known` stores
-//! the digests of logs by path, length and modification time.
+//! has the length and digest of each file. A dive's tables are made again if a file differs from its digest.
+//! `CACHE/known` stores the digests of logs by path, length and modification time.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};

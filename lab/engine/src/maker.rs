@@ -46,7 +46,7 @@ impl Counts {
         self.cached.load(Ordering::Relaxed)
     }
 
-    /// Dives whose tables in the cache were broken and were made again.
+    /// Dives whose tables were broken in the cache and were made again.
     pub fn broken(&self) -> u64 {
         self.broken.load(Ordering::Relaxed)
     }

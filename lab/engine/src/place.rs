@@ -32,7 +32,7 @@ pub struct Place {
 /// A dive of a campaign: a log, or the parts of a recording in order.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DiveLog {
-    /// Path of the log below the place. A recording in parts has the path of the whole recording.
+    /// Path of the log, relative to the place. A recording in parts has the path of the whole recording.
     pub log: String,
     /// Files of the dive, in order.
     pub parts: Vec<Part>,
@@ -41,7 +41,7 @@ pub struct DiveLog {
 /// A file of a dive, with attributes that change if the content changes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Part {
-    /// Path below the place, as stored.
+    /// Path relative to the place, as stored.
     pub path: String,
     /// Length of the file.
     pub bytes: u64,
@@ -119,7 +119,7 @@ impl Place {
         Ok(grouped(parts))
     }
 
-    /// Reads a small text file below the place; `None` if there is no such file.
+    /// Reads a small text file of the place; `None` if there is no such file.
     ///
     /// Errors: the file can't be read.
     pub async fn text(&self, name: &str) -> Result<Option<String>, Error> {
@@ -163,7 +163,7 @@ impl Place {
         Ok(Fetched { files, _copy: Some(copy) })
     }
 
-    /// Path in the store of a path below the place.
+    /// Converts a path relative to the place to a path in the store.
     ///
     /// Errors: none for a listed path.
     fn location(&self, below: &str) -> Result<StorePath, object_store::Error> {

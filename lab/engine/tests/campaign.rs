@@ -20,7 +20,7 @@ fn golden(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden").join(name)
 }
 
-/// A folder with a plant of two dives and one of three.
+/// A folder with two plants: one has two dives, the other has three.
 fn dives() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (number, log) in LOGS.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Tables 3 to 5: simulated runs beside the paper's, and the Wilcoxon tests of §8.1.
+//! Tables 3 to 5: simulated runs compared with the paper's runs, and the Wilcoxon tests of §8.1.
 
 use crate::paper::{Measured, PaperError, Printed, Spacings, Tables, measured, tables};
 use headrace_sampling::layout::HeadLayout;

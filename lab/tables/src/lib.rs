@@ -51,7 +51,7 @@ pub struct Tables {
     pub dives: RecordBatch,
     /// A row for each section of the coverage extent.
     pub sections: RecordBatch,
-    /// A row for each hole that is the largest of a section.
+    /// A row for each hole that is the largest hole of a section.
     pub holes: RecordBatch,
     /// A row for each section that was flagged.
     pub flags: RecordBatch,

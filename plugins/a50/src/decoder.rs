@@ -159,8 +159,8 @@ impl State {
     }
 }
 
-/// Whether a report repeats the previous one: it has the same timestamp, or its values are bit-identical. Values of new
-/// reports always differ.
+/// Whether a report repeats the previous one: true if it has the same timestamp, or if its values are
+/// bit-identical. Values of new reports always differ.
 fn repeats(report: &Velocity, last: &Velocity) -> bool {
     let [now, before] = [report, last].map(|report| report.times_us.map(|[validity, _]| validity));
     let values = |of: &Velocity| {

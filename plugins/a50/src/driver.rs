@@ -1,4 +1,4 @@
-//! Host side of the connection. The driver only listens.
+//! Driver of an A50, which only listens to the connection.
 
 use headrace_sensor::codec::Framing as _;
 use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Wire};

@@ -1,4 +1,4 @@
-//! Device side of the connection: reports at a fixed rate.
+//! Emulates an A50, which sends reports at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -53,7 +53,7 @@ impl Emulator<GroundVelocity> for A50Emulator {
     }
 
     fn tell(&mut self, moved: &GroundVelocity, line: LineSink<'_>) {
-        // Converts to device axes: y and z change sign, as in the opposite direction.
+        // Converts to device axes: y and z change sign, as in the conversion from device axes.
         let [x, y, z] = moved.velocity_mps.0.into();
         let at_us = BEGINS_US + moved.at.since(self.start).0 / 1000;
         let [even, odd] = FOMS_MPS;

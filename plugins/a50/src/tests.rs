@@ -149,7 +149,7 @@ fn unusable_reports_are_withheld_by_reason() {
 }
 
 #[test]
-fn repeated_reports_count_once() {
+fn repeated_reports_are_withheld_and_counted() {
     let mut decoder = decoder();
     let later = Some([1_100_000, 1_220_000]);
     let reports = [

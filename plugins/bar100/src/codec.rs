@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn worked_example_5_is_refused_with_each_reason() {
+    fn bad_status_bytes_of_worked_example_5_are_refused_with_their_reasons() {
         let measure = |status| Transaction::decode(&[MEASURE, status, 0x46, 0x46, 0x4F, 0xA0]);
         assert_eq!(Transaction::decode(&[MEASURE, 0, 0, 0, 0, 0]), Err(TransactionError::NotReady));
         let high = [MEASURE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF];

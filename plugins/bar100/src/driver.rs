@@ -1,4 +1,4 @@
-//! Host side of the bus. The driver reads the calibration and then measures at a fixed rate.
+//! Driver of a Bar100 on an I2C bus. It reads the calibration, and then requests measurements at a fixed rate.
 
 use headrace_sensor::driver::{Carrier, DeviceHealth, Driver, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};

@@ -1,4 +1,4 @@
-//! Sensor side of the bus. The emulator answers requests for calibration and measurements.
+//! Emulates a Bar100, which answers requests for its calibration and for measurements.
 //!
 //! Requests come from an emulated host at a fixed rate, or from a real host.
 

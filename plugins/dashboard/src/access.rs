@@ -72,9 +72,9 @@ impl Token {
 /// Tokens of viewers and operators.
 #[derive(Debug, Clone)]
 pub struct Tokens {
-    /// Token that gives the role of a viewer.
+    /// Token that admits its bearer as a viewer.
     pub viewer: Token,
-    /// Token that gives the role of an operator.
+    /// Token that admits its bearer as an operator.
     pub operator: Token,
 }
 

@@ -290,7 +290,7 @@ impl Collector {
         }
     }
 
-    /// Collects the target point of each ping without a return.
+    /// Collects the point at which each ping without a return was aimed.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn aims_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();

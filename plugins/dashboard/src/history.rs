@@ -1,4 +1,4 @@
-//! History of speed, allowed speed and forecast T over the last half hour, with one value per second.
+//! History of speed, allowed speed and forecast spacing T over the last half hour, with one value per second.
 
 use std::collections::VecDeque;
 
@@ -11,7 +11,7 @@ const MOST: usize = 1800;
 /// History of a dive.
 #[derive(Debug, Default)]
 pub struct History {
-    /// Time, s; then speed, m/s, allowed speed, m/s, and forecast T, m.
+    /// Time, s; then speed, m/s, allowed speed, m/s, and forecast spacing T, m.
     values: VecDeque<(f64, [Option<f64>; 3])>,
     /// Whether the whole dive is kept instead of the last half hour.
     pub(crate) whole: bool,

@@ -1,4 +1,4 @@
-//! Host side of a head's line. The driver keeps one command in flight, and keeps the head on its program.
+//! Driver of a head. It keeps one command in flight, and keeps the head on its program.
 //!
 //! The driver first locates the head. It then homes the head, the short way, to the program's current position, and
 //! requests each ping of the program when due. After a late or lost answer the head lags. The driver then polls it as
@@ -36,7 +36,7 @@ const AHEAD_PINGS: u64 = 10;
 /// A head that answers but lags by more than 1/n of the program is reported as too slow for its settings.
 const TOO_SLOW_SHARE: u64 = 8;
 
-/// Number of unanswered commands, among the last 32, from which a lag is blamed on the line and not on the head.
+/// Number of unanswered commands, among the last 32, at which a lag is blamed on the line and not on the head.
 const LOSSY_FROM: u32 = 3;
 
 /// Purpose of a command.

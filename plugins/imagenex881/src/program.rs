@@ -7,7 +7,7 @@ use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, step_at_most, step_d
 use crate::settings::{Settings, counts_of_rad};
 use crate::stepping::Head;
 
-/// Host side of a head: generates the commands that keep the head on its program.
+/// Generates the commands that keep a head on its program.
 ///
 /// Sectors are swept with steps and reversals. The head's own sector settings aren't used, because they allow multiples
 /// of 3 degrees only. Each sweep pings both ends of the sector, each end once. If the sector isn't a multiple of the
@@ -74,7 +74,7 @@ impl Sector {
 pub struct Planned {
     /// Head position, 0 to 1199.
     pub position: u16,
-    /// Whether the step that follows the previous ping, before this command, would increase the position.
+    /// Stepping direction of the head before this command: true if positions increase.
     pub clockwise: bool,
     /// Encoded command that requests the ping and sets the next step.
     pub command: [u8; COMMAND_BYTES],

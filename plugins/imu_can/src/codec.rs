@@ -32,7 +32,7 @@ pub enum Message {
 }
 
 impl MessageSet {
-    /// Decodes a frame; `None` if the frame isn't of this set. Remote and error frames are of no set.
+    /// Decodes a frame; `None` if the frame isn't of this set. Remote and error frames belong to no set.
     ///
     /// Errors: the identifier is of this set, but the length is wrong.
     pub fn decode(&self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {

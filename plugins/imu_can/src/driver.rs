@@ -1,4 +1,4 @@
-//! Host side of the bus. The driver only listens.
+//! Driver of an inertial unit, which only listens to the CAN bus.
 
 use headrace_sensor::driver::{Carrier, MessageListener};
 use headrace_sensor::geometry::time::DurNs;

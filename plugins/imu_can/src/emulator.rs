@@ -1,4 +1,4 @@
-//! Unit side of the bus. The emulator sends the frames of one sample at a fixed rate.
+//! Emulates an inertial unit on the CAN bus. At a fixed rate, it sends all frames of one sample.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::math;

@@ -157,7 +157,7 @@ fn emulated_xsens_round_trips() {
 }
 
 #[test]
-fn constant_motion_gives_zero_rate_and_gravity() {
+fn unit_at_rest_gives_zero_rate_and_constant_readings() {
     let truth = Going::new(0.0, 0.0);
     let mut decoder = ImuDecoder::new(meaning(XSENS));
     let readings = emulated("preset = \"xsens_mti600\"\n", &mut decoder, &truth, 500);
@@ -283,7 +283,7 @@ fn invalid_j1939_values_are_withheld_and_latency_is_subtracted() {
 }
 
 #[test]
-fn bosch_force_is_reported_once_complete() {
+fn bosch_force_is_reported_when_its_last_component_arrives() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Bosch));
     let (rate, force) = (bosch::RawRate::nearest(0.0), bosch::RawAcceleration::nearest(1.0));
     let messages = [
@@ -335,7 +335,7 @@ fn only_the_first_received_kind_of_sbg_time_is_followed() {
 }
 
 #[test]
-fn unmeasured_values_are_sent_in_no_frame() {
+fn unmeasured_values_are_not_sent() {
     let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
     for (own, set, whole, without) in [
         ("preset = \"xsens_mti600\"", XSENS, 4, 3),

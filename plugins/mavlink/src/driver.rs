@@ -1,4 +1,4 @@
-//! Host side of a telemetry link. The driver receives its part's messages and sends heartbeats.
+//! Driver of one part of the vehicle on a telemetry link. It receives the part's messages and sends heartbeats.
 
 use headrace_sensor::codec::Framing as _;
 use headrace_sensor::device::Decoder as _;
@@ -23,8 +23,8 @@ const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
 const COMPONENT_ID: u8 = MavComponent::MAV_COMP_ID_ONBOARD_COMPUTER as u8;
 const SYSTEM_ID: u8 = 1;
 
-/// Driver of a part. The driver delivers only messages of its part, so that each message on a shared line is recorded
-/// once.
+/// Driver of one part of the vehicle. The driver delivers only messages of its part, so that each message on a
+/// shared line is recorded once.
 ///
 /// The driver drops messages of other systems. It also drops all messages until the accepted system is known.
 pub struct MavlinkDriver {

@@ -1,4 +1,4 @@
-//! Autopilot side of the line. The emulator sends the messages of one part at a fixed rate.
+//! Emulates an autopilot, which sends the messages of one part of the vehicle at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_sensor::geometry::math;

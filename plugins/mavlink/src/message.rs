@@ -13,11 +13,11 @@ use crate::dialect::{
 };
 use crate::frame::{Frame, encode};
 
-/// Unit of acceleration: a thousandth of standard gravity, m/s^2.
+/// Acceleration of one count: a thousandth of standard gravity, m/s^2.
 pub const MILLI_G_MPS2: f64 = 9.806_65e-3;
-/// Unit of turn rate, rad/s.
+/// Turn rate of one count: a milliradian per second, in rad/s.
 pub const MILLIRADPS: f64 = 1e-3;
-/// Unit of pressure, Pa.
+/// Pressure of one wire unit: a hectopascal, in Pa.
 pub const HECTOPASCAL: f64 = 100.0;
 
 /// One message.

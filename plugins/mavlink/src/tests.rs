@@ -382,7 +382,7 @@ fn first_autopilot_is_used_and_others_are_counted() {
 }
 
 #[test]
-fn log_of_many_systems_gives_the_readings_of_one() {
+fn log_of_many_systems_gives_the_readings_of_one_system() {
     let autopilot = heartbeat_of(7, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
     for (first, believed) in [(autopilot, 1100.0), (Vec::new(), 800.0)] {
         let mut decoder = decoder(PRESSURE);

@@ -1,4 +1,4 @@
-//! Host side of an echosounder's line. The driver sends the settings first, and then gets a distance in each interval.
+//! Driver of an echosounder. It sends the settings first, and then gets a distance in each interval.
 //!
 //! The device must acknowledge each setting. The driver requests distances, or the device sends them continuously.
 
@@ -17,7 +17,7 @@ pub const CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Udp, Carrier::Tcp]
 const SILENCE: DurNs = DurNs::from_millis(50);
 /// Timeout of the answer to a setting or request. Source: Ping protocol, 50 ms, plus an allowance for a bridge.
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
-/// Time that a distance may take beyond the interval.
+/// Timeout of the answer to a distance request, in addition to the interval.
 const PING_TIME: DurNs = DurNs::from_millis(250);
 /// Number of times that a setting is sent before the driver goes on to the next one.
 const TRIES: u32 = 4;

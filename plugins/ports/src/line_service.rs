@@ -110,8 +110,8 @@ struct AttachedState {
     dropped_told: u64,
     dropped_until: MonoNs,
     status: Option<(Phase, String)>,
-    /// Number of good frames so far, and when the line was opened. Then the times of the last bytes and of the last
-    /// good frame.
+    /// Number of good frames so far, and the number when the line was opened. Then the times of the last bytes
+    /// and of the last good frame.
     frames: u64,
     frames_before: u64,
     last_bytes: MonoNs,
@@ -387,7 +387,7 @@ impl LineService {
         Ok(Served::Open)
     }
 
-    /// Reports the packets dropped since the last report to the record.
+    /// Reports to the record the packets that were dropped since the last report.
     fn tell_dropped(&mut self) {
         let now = self.common.host.now();
         for AttachedState { attached, history, dropped_told, dropped_until, .. } in &mut self.devices {
@@ -483,7 +483,7 @@ impl LineService {
         }
     }
 
-    /// Updates the status of each device. A problem that the line itself reports overrides them.
+    /// Updates the status of each device. A problem that the line itself reports overrides these statuses.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
             let (phase, words) = device.judge(now);

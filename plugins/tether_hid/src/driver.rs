@@ -1,4 +1,4 @@
-//! Host side of a counter's line. The driver only listens.
+//! Driver of a cable counter, which only listens to the line.
 
 use headrace_sensor::driver::{Carrier, Listener, MessageListener};
 use headrace_sensor::geometry::time::DurNs;

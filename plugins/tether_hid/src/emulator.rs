@@ -1,4 +1,4 @@
-//! Counter side of the line. The emulator sends a report, or a text line, at a fixed rate.
+//! Emulates a cable counter, which sends a report or a text line at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::math;

@@ -44,7 +44,7 @@ enum Wire {
 #[derive(Clone, Copy)]
 struct Preset {
     counts_per_metre: f64,
-    /// Standard deviation without rounding, m. The cable slips a little on its wheel.
+    /// Standard deviation of the length, excluding rounding, m. The cable slips a little on its wheel.
     sd_m: f64,
 }
 

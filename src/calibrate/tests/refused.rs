@@ -40,7 +40,7 @@ fn head_that_sees_too_little_wall_is_refused() {
 /// Section and returns are symmetric. The two sides can't be distinguished without echosounders, or if the
 /// vehicle is in the centre.
 #[test]
-fn sense_of_rotation_in_a_symmetric_section_needs_echosounders_off_the_centre() {
+fn symmetric_section_hides_the_sense_of_rotation_without_echosounders_or_at_the_centre() {
     let wrong = [Wrong::default(); 2];
     for (at, has_echoes, told) in
         [([0.6, 2.3], true, true), ([0.6, 2.3], false, false), ([0.0, 2.3], true, false)]

@@ -7,7 +7,7 @@ use headrace_pictures::polyline::{Frame, Px};
 
 use super::laid::Laid;
 
-/// Fill colour of the circle of diameter T.
+/// Fill colour of the circle whose diameter is the spacing T.
 pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
 /// Position of the caption, pixels.
@@ -16,7 +16,7 @@ const WORDS: Px = [634.0, 348.0];
 const APART_PX: f64 = 4.0;
 /// Number of samples above which single samples can't be distinguished.
 const MOST: usize = 450;
-/// Half the width of the detail, as a multiple of T.
+/// Half the width of the detail, as a multiple of the spacing T.
 const HALF: f64 = 1.5;
 
 struct Detail<'c> {

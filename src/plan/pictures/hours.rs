@@ -1,4 +1,4 @@
-//! Chart of hours against T.
+//! Chart of the duration of a dive, in hours, against the sample spacing T.
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart, short};
@@ -18,14 +18,14 @@ const LEAST: u32 = 300;
 /// Style of the band under the mode that takes the least time.
 const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::T };
 
-/// The T that the chart marks, and the hours that every mode takes for it.
+/// The spacing T that the chart marks, and the hours that every mode takes for it.
 struct Sought {
     t_m: f64,
     /// Hours, by mode.
     hours: Vec<Option<f64>>,
 }
 
-/// Draws the hours for the whole length, one way, against T, for every mode.
+/// Draws the hours for the whole length, one way, against the spacing T, for every mode.
 pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let sought = sought(shown, &modes)?;
@@ -44,7 +44,7 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     Ok(canvas.into_svg())
 }
 
-/// Draws all curves and marks, if any mode gives a T.
+/// Draws all curves and marks, if any mode gives a finite spacing T.
 fn curves(
     chart: &Chart<'_>,
     shown: &Shown<'_>,
@@ -65,14 +65,14 @@ fn curves(
     Ok(())
 }
 
-/// T that the chart marks: the target, or else the T at the requested speed.
+/// The spacing T that the chart marks: the target, or else T at the requested speed.
 fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let t_m = match shown.question.target_m {
         Some(target_m) => target_m,
         None => shown.planner.t_max_m(shown.mode, shown.asked_mps().unwrap_or(shown.speed_mps))?,
     };
-    // Without a T, the chart has text in place of curves, and any axis will do.
+    // Without a finite T, the chart has text in place of curves, and any axis will do.
     let t_m = if t_m.is_finite() { t_m } else { 1.0 };
     let hours = |mode: &Mode| Some(length_m / shown.planner.v_max_mps(mode.number, t_m).ok()? / 3600.0);
     Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
@@ -120,7 +120,7 @@ fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<V
     Ok(points)
 }
 
-/// Fewest hours of any mode for each T.
+/// Fewest hours of any mode for each spacing T.
 fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
     let length_m = shown.planner.inspection().length_m;
     let point = |k: u32| {

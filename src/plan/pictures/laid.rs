@@ -17,14 +17,14 @@ pub(super) struct Laid {
     pub(super) perimeter_m: f64,
     /// Distance that the vehicle moves in a turn of a head, m.
     pub(super) pitch_m: f64,
-    /// T at this speed, m; `None` if there is a strip that no head sees.
+    /// Sample spacing T at this speed, m; `None` if there is a strip that no head sees.
     pub(super) t_m: Option<f64>,
-    /// Beginning of the chainages that all heads have passed, m.
+    /// Start and end of the stretch that all heads have passed, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
 }
 
-/// A piece of a head's track on the wall. It is drawn as one line.
+/// A piece of a head's track on the wall, which is drawn as one line.
 pub(super) struct Pass {
     pub(super) head: usize,
     pub(super) hidden: bool,
@@ -123,7 +123,7 @@ impl Laid {
     ///
     /// The gap is the largest circle without samples within the travel of a turn.
     ///
-    /// `None` without T.
+    /// `None` without a spacing T.
     pub(super) fn emptiest(&self, arc_m: f64) -> Option<([f64; 2], f64)> {
         /// Number of grid points along the tunnel and around the perimeter.
         const TRIED: [u32; 2] = [120, 40];

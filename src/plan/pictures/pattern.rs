@@ -20,7 +20,8 @@ const LEGEND: Px = [634.0, 412.0];
 /// Points around the wall at which spacing is compared.
 const PLACES: usize = 360;
 
-/// Draws the samples of several turns on the unrolled wall, with a circle of diameter T at the largest gap.
+/// Draws the samples of several turns on the unrolled wall, with a circle at the largest gap. The diameter of
+/// the circle is the spacing T.
 pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let laid = laid::lay(shown)?;
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;

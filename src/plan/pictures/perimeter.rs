@@ -23,15 +23,16 @@ const BAND: Colour = Colour(205, 226, 240);
 /// Spacing around the wall, and the places that the chart marks.
 struct Around {
     places: Vec<WallPlace>,
-    /// Point with the largest T.
+    /// Point with the largest sample spacing T.
     worst: Option<WallPlace>,
-    /// T of the plan, m.
+    /// Sample spacing T of the plan, m.
     counted_m: Option<f64>,
     /// Centre of the widest strip that no head sees, m.
     unseen_m: Option<f64>,
 }
 
-/// Draws the spacing along the perimeter: T_y, T_x, T, the target, and the strips that only some heads see.
+/// Draws the spacings along the perimeter: T_y around the wall, T_x along the tunnel, T of both, the target,
+/// and the strips that only some heads see.
 pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
     let around = Around {
@@ -69,7 +70,7 @@ impl Around {
         self.places.iter().filter_map(|place| place.t_m).fold(0.0, f64::max)
     }
 
-    /// Place of the widest strip that no head sees, and the T across it.
+    /// Place of the widest strip that no head sees, and the spacing T across it.
     ///
     /// `None` if that T would dwarf all other values.
     fn across_m(&self) -> Option<[f64; 2]> {
@@ -78,7 +79,7 @@ impl Around {
     }
 }
 
-/// Draws the T across the widest strip that no head sees.
+/// Draws the spacing T across the widest strip that no head sees.
 fn across(chart: &Chart<'_>, around: &Around) {
     let Some(point) = around.across_m() else { return };
     let place = chart.px(point);
@@ -89,7 +90,7 @@ fn across(chart: &Chart<'_>, around: &Around) {
     chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL);
 }
 
-/// Text on the T of the plan; empty unless it differs from the largest T in the chart.
+/// Text about the plan's spacing T; empty if that is also the largest T in the chart.
 fn note(shown: &Shown<'_>, around: &Around) -> String {
     let (Some(counted_m), Some(here_m)) = (around.counted_m, around.worst.and_then(|place| place.t_m)) else {
         return String::new();
@@ -108,7 +109,7 @@ fn note(shown: &Shown<'_>, around: &Around) -> String {
     format!("The plan uses T = {} m: {why}{allowed}.", short(counted_m))
 }
 
-/// Text on the tolerances that the plan allows for.
+/// Text about the tolerances that the plan allows for.
 fn allowed(shown: &Shown<'_>) -> String {
     let inspection = shown.planner.inspection();
     let drift = (inspection.drift_m > 0.0).then(|| format!("{} m of drift", inspection.drift_m));

@@ -1,4 +1,4 @@
-//! Chart of T against speed.
+//! Chart of the sample spacing T against speed.
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side};
 use headrace_pictures::chart::{Axis, Chart};
@@ -11,10 +11,10 @@ use super::Shown;
 use super::modes::{self, Mode};
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 };
-/// Number of speeds at which T is computed.
+/// Number of speeds at which the spacing T is computed.
 const SPEEDS: u32 = 400;
 
-/// Draws T against speed for every mode, with the target and the requested speed.
+/// Draws the spacing T against speed for every mode, with the target and the requested speed.
 pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let most_mps = most_mps(shown, &modes);
@@ -70,7 +70,7 @@ fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     if most_m > 0.0 { most_m } else { 1.0 }
 }
 
-/// Largest T of any mode within the speed axis.
+/// Largest spacing T of any mode within the speed axis.
 fn highest_m(curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     curves.iter().flat_map(|(_, points)| points).map(|[_, t_m]| *t_m).fold(0.0, f64::max)
 }

@@ -122,7 +122,7 @@ fn pattern_chart_shows_heads_circle_and_hidden_tracks() {
 
 /// In the pattern, no empty circle has a diameter larger than T, and no gap is larger than the drawn one.
 #[test]
-fn no_empty_circle_exceeds_diameter_t() {
+fn no_empty_circle_is_wider_than_the_spacing_t() {
     let plans = [
         (ONE, 0.058),
         ("--tunnel ceran --heads 4", 0.2),
@@ -149,7 +149,7 @@ fn no_empty_circle_exceeds_diameter_t() {
     }
 }
 
-/// Names of the modes that meet a target. `words` makes the text on each mode's speed.
+/// Names of the modes that meet a target. `words` makes the text about each mode's speed.
 fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> Vec<String> {
     let planner = Planner::new(inspection).unwrap();
     let speed = |mode| Some((modes::name(&planner, mode), planner.v_max_mps(mode, target_m).ok()?));
@@ -173,7 +173,7 @@ fn speed_chart_names_every_mode_and_its_speed() {
 }
 
 #[test]
-fn hour_chart_marks_the_best_mode_and_the_available_time() {
+fn duration_chart_marks_the_best_mode_and_the_available_time() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "hours");
     let modes = met(inspection(VITA_2), 0.5, |v_mps| format!("{} h", modes::hours(7000.0 / v_mps / 3600.0)));
     for mode in &modes {
@@ -191,7 +191,7 @@ fn hour_chart_marks_the_best_mode_and_the_available_time() {
 }
 
 #[test]
-fn hour_chart_without_a_target_uses_t_at_the_requested_speed() {
+fn duration_chart_without_a_target_uses_the_spacing_at_the_requested_speed() {
     let planner = Planner::new(inspection(VITA_2)).unwrap();
     let finest = planner.answers(&SPEED, None).unwrap().iter().position(|answer| answer.best).unwrap();
     let svg = draw(inspection(VITA_2), finest, 0.1, SPEED, "hours");

@@ -4,7 +4,8 @@ use headrace_geometry::math;
 use headrace_sampling::plan::{Planner, WallPlace};
 use headrace_sampling::strips::Strips;
 
-/// Point with the largest T. Of nearly equal ones, the point nearest to the left wall.
+/// Point with the largest sample spacing T. Among nearly equal ones, the point nearest to the left wall is
+/// returned.
 pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace> {
     /// Ratio above which two values of T count as equal. Steps across a strip's edge make T slightly larger
     /// there than within the strip.

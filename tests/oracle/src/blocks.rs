@@ -22,7 +22,7 @@ pub(crate) struct Blocks {
 }
 
 impl Blocks {
-    /// Wraps a dive's true samples. Blocks of a long dive are built on demand.
+    /// Takes the true samples of a dive. Blocks of a long dive are built on demand.
     ///
     /// Errors: as for [`Wall::new`].
     pub(crate) fn of(truth: &Truth) -> Result<Self, TruthError> {

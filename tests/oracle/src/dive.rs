@@ -231,7 +231,7 @@ impl Recorded {
         JudgedDive { report, truth: Arc::clone(&self.truth), sections }
     }
 
-    /// CPU time of a replay with the settings of a vehicle file, without arming and report, s.
+    /// CPU time of a replay with the settings of a vehicle file, s. Arming and the report are excluded.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn cpu_s(&self, vehicle: &VehicleConfig) -> Result<f64, TruthError> {
@@ -338,8 +338,8 @@ impl Seen {
 struct Shifts(Vec<(f64, f64)>);
 
 impl Shifts {
-    /// Median shift of the samples near a section. Without any, the shift of the nearest sample; without samples at
-    /// all, 0.
+    /// Median shift of the samples near a section. If there are none near it, the shift of the nearest sample;
+    /// in a dive without samples, 0.
     fn about(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|(sample_x_m, _)| *sample_x_m < x_m);
         let near = self.0.get(before(from_m - NEAR_M)..before(to_m + NEAR_M)).unwrap_or_default();

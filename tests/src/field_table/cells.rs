@@ -89,7 +89,7 @@ pub enum Condition {
     /// A MEMS unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error, and steel
     /// nearby.
     Poor,
-    /// Series of lost returns, returns from objects before the wall, and second echoes.
+    /// Runs of lost returns, returns from objects in front of the wall, and second echoes.
     Murk,
     /// The wall is as rough as vehicle files allow for.
     Rough,
@@ -433,8 +433,8 @@ impl Cell {
 
     /// Murky stretches of 5 to 20 m length with gaps of 2 to 6 m.
     ///
-    /// In these stretches, 10 to 30 % of the heads' returns are missing, in series. Clusters before the wall cause 5
-    /// % of the returns, and second echoes cause some. Source: field.md, "murk".
+    /// In these stretches, 10 to 30 % of the heads' returns are missing, in runs. Clusters in front of the wall
+    /// cause 5 % of the returns, and second echoes cause some. Source: field.md, "murk".
     fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
         if self.condition != Condition::Murk {
             return String::new();

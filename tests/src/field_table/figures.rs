@@ -18,8 +18,8 @@ pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
     ("tether", Sense::Tether),
     ("dvl", Sense::Velocity),
 ];
-/// Length at each end of a dive in which sections have neighbours on one side only, in addition to the target, m. It
-/// covers the hull and the distance to the next pass.
+/// Length that is left out at each end of a dive, in addition to a length equal to the target, m. Sections
+/// there have neighbours on one side only. The length covers the hull and the distance to the next pass.
 const END_M: f64 = 2.0;
 /// A hole belongs to a section if its centre is at least this far from both bounds of the section, m.
 const FLANK_M: f64 = 0.005;
@@ -160,8 +160,8 @@ impl Figures {
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        // A circle centred on a section's bound belongs to the hole of the neighbouring section, which it would count
-        // twice.
+        // A circle centred on a section's boundary belongs to the neighbouring section's hole. To include it
+        // here would count that hole twice.
         let is_own = section
             .report
             .hole_x_m
@@ -217,7 +217,7 @@ impl Figures {
         self.passable_m / self.inner_m
     }
 
-    /// Root mean square of the ratio of errors to their standard deviations.
+    /// Root mean square of the errors, each divided by its standard deviation.
     pub fn ratio_rms(&self) -> f64 {
         if self.errors.is_empty() {
             f64::NAN
@@ -253,12 +253,12 @@ impl Figures {
         (used > 0.0).then(|| sum / used)
     }
 
-    /// Fraction of sections with D_true over the target that passed.
+    /// Among sections with D_true over the target, the fraction that passed.
     pub fn false_passes(&self) -> f64 {
         f64::from(self.passed_over) / f64::from(self.over.max(1))
     }
 
-    /// Fraction of sections with D_true below 0.9 times the target that failed.
+    /// Among sections with D_true below 0.9 times the target, the fraction that failed.
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }

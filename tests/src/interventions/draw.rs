@@ -11,8 +11,8 @@ use crate::random_dives::Draw;
 
 /// Chainage at which dives begin, m.
 pub(super) const START_M: f64 = 3.0;
-/// Distance that a vehicle drives beyond the far end, m. A vehicle that turns back too early drives back by this
-/// distance.
+/// Distance that a vehicle drives beyond the far end, m. A vehicle that turns back too early stops this far
+/// short of the far end.
 const ON_M: f64 = 4.5;
 /// Distance in which the vehicle rolls before a rolled pass, m.
 const ROLLS_OVER_M: f64 = 1.0;

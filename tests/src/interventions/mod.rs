@@ -44,7 +44,8 @@ pub struct Judged {
     pub run: Option<u32>,
     /// Diameter of the hole, m.
     pub hole_m: f64,
-    /// Diameter of the hole without each single injected cause, m; infinite if the hole can't be measured.
+    /// Diameter of the hole with one injected cause removed, one value per cause, m; infinite if the hole can't
+    /// be measured.
     pub without_m: Vec<f64>,
     /// Evidence for the displayed causes.
     pub evidence: Evidence,
@@ -56,8 +57,8 @@ impl Judged {
         self.right.contains(&self.told)
     }
 
-    /// Whether an injected cause is displayed that is nearly right: without it, the hole exceeds the target by 5 % at
-    /// most.
+    /// Whether the only displayed cause is nearly right: it was injected, and without it the hole exceeds the
+    /// target by at most 5 %.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)

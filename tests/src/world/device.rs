@@ -58,7 +58,7 @@ impl Device {
         self.whole
     }
 
-    /// Whether the cable delays and splits frames at most.
+    /// Whether the cable loses no frame: at worst, it delays and splits frames.
     pub fn is_lossless(&self) -> bool {
         self.faults.iter().all(|fault| matches!(fault.what, CableFault::Cut | CableFault::Held))
     }

@@ -51,7 +51,7 @@ const LONGEST_STEP_NS: usize = 12_000_000;
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
 /// Capacity of the queue to the terminal. It is small, so that the queue becomes full soon.
 const NOTICES: usize = 4;
-/// Age from which recorded packets are always synced: half a second plus one step of the world.
+/// Age beyond which recorded packets are always synced: half a second plus one step of the world.
 const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
 
 const TUNNEL: &str = r#"name = "a world of faults"
@@ -310,8 +310,8 @@ impl World {
         Duration::from_nanos(u64::try_from(self.clock.now().since(BEGIN).0).unwrap())
     }
 
-    /// Lets the recorder write. Without a disk failure, packets count as certain half a second and one step after the recorder
-    /// took them.
+    /// Lets the recorder write. Without a disk failure, packets count as certainly recorded half a second and
+    /// one step after the recorder took them.
     fn record(&mut self, now: MonoNs) {
         let since_begin = self.since_begin();
         let failures = self.disk.failures();

@@ -22,13 +22,14 @@ pub(super) struct Placed {
 pub(super) struct Taken(Vec<Frame>);
 
 impl Taken {
-    /// Occupies the area of a marker.
+    /// Marks the area of a marker as occupied.
     pub(super) fn marker(&mut self, [x, y]: Px) {
         const HALF_PX: f64 = 6.0;
         self.0.push(Frame { left: x - HALF_PX, top: y - HALF_PX, right: x + HALF_PX, bottom: y + HALF_PX });
     }
 
-    /// Finds and occupies a free place for a label beside a marker, within a frame; `None` if there is no room.
+    /// Finds a free place for a label beside a marker, within a frame, and marks it as occupied; `None` if
+    /// there is no room.
     pub(super) fn label(
         &mut self,
         [x, y]: Px,

@@ -193,7 +193,7 @@ struct Prepared {
     judged: Vec<Vec<Vec<Judged>>>,
 }
 
-/// Times all settings of all cases in turns.
+/// Times all settings of all cases, round by round.
 fn points(
     inputs: &Inputs<'_>,
     settings: &[Setting],
@@ -324,7 +324,7 @@ impl Setting {
 /// Name of the figure that is a time and not an error.
 const SEARCH: &str = "search or count alone";
 
-/// Judges each section by a T of the lattice.
+/// Judges each section by the spacing T that `t_m` returns for it.
 fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) -> Vec<Judged> {
     let target_m = dive.report.target_m;
     let judged = |section: &JudgedSection| {

@@ -26,7 +26,7 @@ use headrace_oracle::{TruthError, timed};
 /// fewer rays.
 const FINEST: Looks = Looks { ring: 3600, anew_m: Some(0.001) };
 const AS_FINE: Looks = Looks { ring: 3000, anew_m: Some(0.001) };
-/// Largest difference of speed that counts as equal, m/s.
+/// Difference up to which two speeds count as equal, m/s.
 const RESOLUTION_MPS: f64 = 1e-5;
 const USUAL_TICK_MS: u32 = 20;
 
@@ -258,7 +258,7 @@ impl Marker {
     }
 }
 
-/// Times all markers of all scenes in turns.
+/// Times all markers of all scenes, round by round.
 fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
     let mut all: Vec<(&Recorded, &Marker)> = Vec::new();
     for Prepared { recorded, markers, .. } in &prepared {

@@ -18,7 +18,7 @@ const LENGTH_M: f64 = 7000.0;
 const PERIMETER_M: f64 = 28.0;
 /// Number of samples per metre of tunnel.
 const PER_M: u32 = 1_000;
-/// Metres of wall for which samples remain unpacked, and metres for which they are packed.
+/// Length of tunnel whose samples stay unpacked, and length whose samples are packed, m.
 const OPEN_M: u32 = 20;
 const PACKED_M: u32 = 160;
 /// Bytes of a sample before packing: chainage, arc length, step, visit, head.

@@ -311,7 +311,7 @@ impl Prepared {
     }
 }
 
-/// Times the distinct settings of all scenes in turns.
+/// Times the distinct settings of all scenes, round by round.
 fn points(inputs: &Inputs<'_>, prepared: &[Prepared]) -> Result<Vec<Point>, CostError> {
     let all: Vec<(&Prepared, (u32, Way))> =
         prepared.iter().flat_map(|place| place.unique.iter().map(move |unique| (place, *unique))).collect();

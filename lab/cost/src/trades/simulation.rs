@@ -216,7 +216,7 @@ impl Prepared {
     }
 }
 
-/// Times all settings of all scenes in turns.
+/// Times all settings of all scenes, round by round.
 ///
 /// The time saved by leaving an effect out is relative to the scene with all effects.
 fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
@@ -234,7 +234,7 @@ fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, Co
     Ok(points)
 }
 
-/// Method name of the points with one effect left out. The default leaves none out and comes first.
+/// Method name of the points with one effect left out. The default point leaves no effect out and comes first.
 const LEFT_OUT: &str = "left out";
 
 fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prepared>, CostError> {
@@ -491,7 +491,7 @@ fn advice(points: &[Point]) -> String {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
-    // A dive without any D gives no finite change.
+    // A dive in which no section has a D gives no finite change.
     let is_known = |point: &&Point| figure(point, "change of D").is_finite();
     let most = left_out().filter(is_known).max_by(|a, b| a.error().total_cmp(&b.error()));
     let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);

@@ -17,7 +17,7 @@ use crate::words::number;
 use headrace_oracle::dive::Recorded;
 
 const VEHICLE: &str = "vita2-4.toml";
-/// The mode and the target, m, of the heads.
+/// Mode of the heads; then the target, m.
 const MODE: &str = "fast";
 const TARGET_M: f64 = 0.5;
 /// Length of the tunnel, m.

@@ -349,7 +349,7 @@ fn true_hole(inputs: &Inputs<'_>, dives: &Dives<'_>, seed: u32) -> Result<TrueHo
     Ok(TrueHole { hole_m: truth.wall()?.hole_m(from_m, to_m), may_be_off_m })
 }
 
-/// The plan of a vehicle file with the given layout and tolerated drift, as from `headrace plan`.
+/// The plan that `headrace plan` makes of a vehicle file with the given layout and tolerated drift.
 ///
 /// Errors: the vehicle is invalid, or can't be planned for.
 pub fn planner(

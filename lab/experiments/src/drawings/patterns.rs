@@ -155,7 +155,7 @@ pub(super) fn sectors(figure: &Sectors) -> String {
         measured(&chart, [*from_m, *to_m], figure.line_m, look, (&words, -13.0));
     }
     if let [from_m, _, to_m, ..] = figure.at_line.as_slice() {
-        /// Distance of the dimension line that shows the sum below the measured line on the wall, pixels.
+        /// Distance of the sum's dimension line below the measured line on the wall, pixels.
         const BELOW_PX: f64 = 30.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.line_m, BELOW_PX);

@@ -21,9 +21,9 @@ const CELLS: [u32; 2] = [40, 100];
 const LINES: u32 = 360;
 /// Ratio of a line's largest gap to the usual gap above which the line counts as in a shadow.
 const IN_SHADOW: f64 = 1.5;
-/// Share of cells within the distance scale.
+/// Share of cells whose distances lie within the colour scale.
 ///
-/// The cells at a floor's corners exceed the scale, since a Poisson surface rounds corners off.
+/// The cells at a floor's corners lie beyond the scale, since a Poisson surface rounds corners off.
 const SCALE_SHARE: f64 = 0.93;
 
 /// Number of heads, mode, whether in sectors, whether aligned.

@@ -29,7 +29,7 @@ pub(super) fn fitting_place(rig: Rig) -> Place {
     }
 }
 
-/// Whether the T_y columns of this row of Table 4 are a copy of FASTER's.
+/// Whether the T_y columns of this row of Table 4 are copied from the row of mode FASTER.
 pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }

@@ -41,7 +41,7 @@ fn printed_digits_are_recognised_as_rounded_or_truncated() {
 }
 
 #[test]
-fn table_1_matches_to_the_digit() {
+fn recomputed_table_1_matches_to_the_digit() {
     let table = tables().table_1;
     let expected = [[8.0, 4.67], [4.0, 2.33], [2.67, 1.55], [2.0, 1.16], [1.0, 0.0]];
     let printed =
@@ -57,7 +57,7 @@ fn table_1_matches_to_the_digit() {
 }
 
 #[test]
-fn table_2_matches_to_the_digit() {
+fn recomputed_table_2_matches_to_the_digit() {
     let table = tables().table_2;
     assert_eq!(table.rows.len(), 5);
     let cells = || table.rows.iter().flat_map(|row| [&row.samples_per_turn, &row.ping_rate_hz]);

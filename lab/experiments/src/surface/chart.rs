@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn boulder_between_samples_is_missed_and_counted_in_full() {
+    fn boulder_between_samples_counts_as_an_error_of_its_full_height() {
         let chart = Chart::new(20.0, &lattice(20.0, |_, _| 0.0)).unwrap();
         let boulder = |x: f64, s: f64| if math::hypot(x - 5.25, s - 10.25) < 0.2 { -0.3 } else { 0.0 };
         let compared = chart.compare(&Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.05 }, boulder);

@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn tube_5_cm_off_the_wall_has_that_mean_distance() {
+    fn tube_5_cm_off_the_wall_has_a_mean_distance_of_5_cm() {
         let profile = shapes::circle(2.0).unwrap();
         let stretch = Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.1 };
         let mesh = tube(&profile, 0.05);

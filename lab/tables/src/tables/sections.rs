@@ -138,14 +138,14 @@ pub(crate) fn sections() -> Table<SectionRow> {
     }
 }
 
-/// A hole, with the adjacent sections whose largest hole it is.
+/// A hole, and the run of adjacent sections that share it as their largest hole.
 pub(crate) struct Hole<'a> {
     section: &'a SectionRow,
     end_m: f64,
     sections: i64,
 }
 
-/// The holes of a dive. A hole shared by several adjacent sections occurs once.
+/// The holes of a dive. A hole shared by several adjacent sections is listed once.
 pub(crate) fn holes(sections: &[SectionRow]) -> Vec<Hole<'_>> {
     let place = |section: &SectionRow| {
         [section.hole_m, section.hole_x_m, section.hole_arc_m].map(|number| number.map(f64::to_bits))

@@ -18,7 +18,7 @@ use crate::command::{Asked, Command, LONGEST};
 use crate::model::{Body, Message, Sort};
 use crate::site::May;
 
-/// Time from an answer to the next ping, and timeout of an answer.
+/// Time from an answer to the next WebSocket ping, and timeout of an answer.
 ///
 /// Together they drop a stalled viewer within [`STALLED_AFTER`], even if its machine buffers the feed unread.
 const PING_EVERY: Duration = Duration::from_secs(2);
@@ -286,7 +286,8 @@ impl Viewer {
     fn obey(&mut self, text: &str) -> Result<&'static str, String> {
         match Asked::parse(text)? {
             Asked::Rate(hz) => {
-                // Slightly shorter than the period, so that jitter of regular states doesn't skip one.
+                // The interval is slightly shorter than the period, so that no state is skipped because of
+                // jitter.
                 self.state_every = Duration::from_secs_f64((0.9 / hz).max(0.0));
                 Ok("rate")
             }

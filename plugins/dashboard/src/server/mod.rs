@@ -93,9 +93,10 @@ pub enum PageError {
     Tls(String),
 }
 
-/// Handler of operators' commands. Its error is the reason of a refusal.
+/// Handler of operators' commands. Its error is the reason for a refusal.
 pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
-/// Handler that logs the recording of a voice note and then notifies the loop. Its error is the reason of a refusal.
+/// Handler that logs the recording of a voice note and then notifies the loop. Its error is the reason for a
+/// refusal.
 pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
 /// Finds in a log the recording of the note with this id and time, seconds.
 ///

@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_connections_take_no_place_of_viewers_or_operators() {
+    fn silent_connections_take_no_places_reserved_for_viewers_or_operators() {
         let places = Arc::new(Places::default());
         let of = |role| {
             let place = places.enter(client(1));
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn viewer_streams_take_no_stream_of_operators() {
+    fn viewer_streams_take_no_streams_reserved_for_operators() {
         let places = Arc::new(Places::default());
         let stream = |role, number, is_forwarded| {
             let place = places.enter(client(9));

@@ -242,7 +242,7 @@ fn unread_streams_are_dropped_after_10_s_without_progress() {
 }
 
 #[test]
-fn samples_answer_has_one_content_type() {
+fn answer_to_a_samples_request_has_one_content_type() {
     let (status, head) = served(&[]).ask("GET /samples?from_m=0&to_m=1", VIEWER, "");
     assert_eq!((status, head.matches("content-type:").count()), (200, 1), "{head}");
     assert!(head.contains("content-type: application/octet-stream"), "{head}");
@@ -308,7 +308,7 @@ fn repeated_wrong_token_uses_one_guess() {
 }
 
 #[test]
-fn guesses_behind_a_declared_proxy_count_by_forwarded_address() {
+fn guesses_through_a_declared_proxy_count_for_the_forwarded_address() {
     let served = served(&[Ipv4Addr::LOCALHOST.into()]);
     let status = |of: &str, token: &str| {
         let headers = format!("X-Forwarded-For: {of}\r\nAuthorization: Bearer {token}\r\n");

@@ -1,4 +1,5 @@
-//! Unit side of the bus. The emulator sends the DBC's frames of one sample at a fixed rate.
+//! Emulates an inertial unit on the CAN bus. At a fixed rate, it sends one sample as all frames that the DBC
+//! file defines.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};

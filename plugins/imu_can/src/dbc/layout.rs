@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn value_out_of_range_encodes_as_the_nearest() {
+    fn value_out_of_range_is_encoded_as_the_nearest_allowed_value() {
         assert_eq!(Bits::Unsigned.raw(-3.0, 8), 0);
         assert_eq!(Bits::Unsigned.raw(1e30, 8), 255);
         assert_eq!(Bits::Signed.raw(1e30, 8), 127);
@@ -218,7 +218,7 @@ mod tests {
     /// Example of Motorola start bits in the DBC format: `7|16@0` is bytes 0 and 1, and `39|16@0` is bytes 4 and 5,
     /// most significant first.
     #[test]
-    fn motorola_start_bits_name_the_most_significant() {
+    fn motorola_start_bit_is_the_most_significant_bit() {
         let data = [1, 2, 3, 4, 5, 6, 7, 8];
         let extract = |start, order| Layout::new(start, 16, order, 8).unwrap().extract(data);
         assert_eq!(extract(7, Order::Motorola), 0x0102);

@@ -1,4 +1,5 @@
-//! Makers' message sets. Values are kept as the wire's integers; constants beside them have their quanta.
+//! Makers' message sets. Values are kept as integer counts, as on the wire. Constants beside them state the
+//! size of one count.
 
 pub mod bosch;
 pub mod j1939;
@@ -19,7 +20,7 @@ pub struct MessageError {
     pub needed: usize,
 }
 
-/// Converts integers to physical units, given the quantum.
+/// Converts counts to physical units; `quantum` is the size of one count.
 pub fn scaled<const N: usize>(raw: [i16; N], quantum: f64) -> [f64; N] {
     raw.map(|raw| f64::from(raw) * quantum)
 }

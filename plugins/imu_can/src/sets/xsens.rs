@@ -7,19 +7,19 @@
 use super::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// Quaternion component.
+/// Quaternion component of one count.
 pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
-/// Euler angles, degrees.
+/// Euler angle of one count, degrees.
 pub const EULER_QUANTUM_DEG: f64 = 1.0 / 128.0;
-/// Turn rate, rad/s.
+/// Turn rate of one count, rad/s.
 pub const RATE_QUANTUM_RADPS: f64 = 1.0 / 512.0;
-/// Acceleration, m/s^2.
+/// Acceleration of one count, m/s^2.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 1.0 / 256.0;
-/// Magnetic field, in units of the earth's field.
+/// Magnetic field of one count, in units of the earth's field.
 pub const MAGNETIC_QUANTUM: f64 = 1.0 / 1024.0;
-/// Temperature, degrees Celsius.
+/// Temperature difference of one count, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1.0 / 256.0;
-/// Air pressure, Pa.
+/// Air pressure of one count, Pa.
 pub const PRESSURE_QUANTUM_PA: f64 = 1.0 / 32_768.0;
 
 /// Identifiers used by the device.

@@ -16,7 +16,8 @@ use super::cable::CableNavigation;
 use crate::error::CostError;
 use headrace_oracle::dive::{JudgedDive, Recorded};
 
-/// Capacity of the journal. Steps are read right after their epoch, so the capacity covers the steps after a silence.
+/// Capacity of the filter's journal, steps. The journal is emptied after each reading, but the first reading
+/// after a silence may add many steps.
 const JOURNAL: usize = 4096;
 
 /// A reading as passed to navigation.

@@ -83,7 +83,7 @@ fn false_lengths_are_refused() {
 }
 
 #[test]
-fn value_beyond_its_bits_is_not_encoded() {
+fn value_too_large_for_its_bits_is_not_encoded() {
     let value = Return::decode(&EXAMPLE_4, None).unwrap();
     let too_far = Return { header: Header { profile_counts: 0x4000, ..value.header }, ..value };
     assert!(matches!(too_far.encode(), Err(ReturnError::TooGreat { max: 0x3FFF, .. })));
