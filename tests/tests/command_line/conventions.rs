@@ -150,7 +150,7 @@ fn report_to_a_named_pipe_fails_without_a_reader_and_is_complete_with_one() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn too_little_address_space_is_refused_without_an_abort() {
+fn lack_of_address_space_is_an_error_and_no_abort() {
     let folder = Folder::with_dive();
     let headrace = program();
     for limit_kib in [100_000, 150_000, 200_000] {

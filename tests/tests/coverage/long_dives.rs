@@ -15,7 +15,7 @@ const FROM_M: f64 = 5.0;
 const TO_M: f64 = 9.0;
 /// Chainage of the end of the dive, m.
 const END_M: f64 = 16.0;
-/// Largest distance between a hole's bounds if samples in full cells are thinned out, m.
+/// Largest difference between the bounds of a hole if samples in full cells are thinned out, m.
 const THINNED_M: f64 = 0.04;
 
 fn scene(parked_s: u32, rounds: usize) -> String {
@@ -60,7 +60,7 @@ fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
             panic!("section {}: no bounds", b.report.start_m)
         };
         assert!(most_m - least_m <= THINNED_M, "section {}: {least_m} to {most_m}", b.report.start_m);
-        // For sections passed after the long phase, the hole is as close to the truth as without that phase.
+        // Sections beyond the long phase have holes as close to the truth as without that phase.
         if a.report.start_m >= TO_M + 1.0 {
             for (off_m, section) in off_m.iter_mut().zip([a, b]) {
                 *off_m = off_m.max((section.report.hole_m.unwrap() - section.true_hole_m).abs());

@@ -19,7 +19,7 @@ fn committed() -> Wall {
     Wall::new(rest.lines().skip(1).map(place), perimeter_m).unwrap()
 }
 
-/// Bounds and D of the sections in a table.
+/// Start, end and D of the sections in a table, m.
 fn holes(table: &str) -> Vec<[f64; 3]> {
     let row = |line: &str| -> [f64; 3] {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();

@@ -1,4 +1,4 @@
-//! Hand-made MCAP records and zstd frames, because ordinary writers produce no wrong ones.
+//! Hand-made MCAP records and zstd frames, because ordinary writers can't produce invalid ones.
 //!
 //! Sources: MCAP format specification, "Records"; RFC 8878, 3.1.1.
 
@@ -32,7 +32,7 @@ pub(crate) fn message(channel: u16, at: u64, data: &[u8]) -> Vec<u8> {
     record(5, &[message_head(channel, at).as_slice(), data].concat())
 }
 
-/// A message's fields before its data.
+/// Fields of a message record that precede its data.
 pub(crate) fn message_head(channel: u16, at: u64) -> Vec<u8> {
     [&channel.to_le_bytes()[..], &[0; 4], &at.to_le_bytes(), &at.to_le_bytes()].concat()
 }
@@ -66,7 +66,7 @@ pub(crate) fn ended(records: &[Vec<u8>], summary: u64) -> Vec<u8> {
     [MAGIC, &header, &records.concat(), &record(15, &[0; 4]), &footer, MAGIC].concat()
 }
 
-/// A part of the data after unpacking a frame.
+/// A part of the data in a frame, before compression.
 pub(crate) enum Part<'a> {
     Bytes(&'a [u8]),
     /// One byte and its number of repetitions.

@@ -1,4 +1,4 @@
-//! Seeks in odd logs. Definitions that come after a position must be unknown at that position.
+//! Seeks in odd logs. After a seek, the reader must not know definitions that come later in the log.
 
 use std::io::Cursor;
 
