@@ -1,4 +1,4 @@
-//! Dives in the simulated world of faults, which satisfy all invariants for every seed.
+//! Dives in a simulated world of faults. For every seed, they satisfy all invariants.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -11,7 +11,7 @@ use headrace_tests::world::{DiveResult, Sabotage, World};
 
 /// Default seeds. The environment can set others: `HEADRACE_WORLD_SEEDS=1000..2000`.
 const SEEDS: std::ops::Range<u64> = 0..300;
-/// Number of worlds, in at least one of which a sabotage must be detected.
+/// Number of worlds tried. Each sabotage must be detected in at least one of them.
 const ENOUGH: u64 = 100;
 
 fn seeds() -> std::ops::Range<u64> {
