@@ -42,8 +42,8 @@ fn words(said: &[String]) -> String {
     all.join("\n")
 }
 
-/// Unplugs a device, waits until it is reported missing, plugs it in, and waits until it is used again. Does this twice
-/// and returns the statuses.
+/// Unplugs a device when the next request arrives, waits until it is reported missing, plugs it in, and waits until it
+/// is used again. Does this twice and returns the statuses.
 fn unplugged_and_plugged_in(text: &'static str, end: End, name: &str) -> String {
     let folder = Folder::new();
     let log = folder.path(&format!("{name}.mcap"));
