@@ -20,7 +20,7 @@ fn seeds() -> std::ops::Range<u64> {
     from.parse().unwrap()..to.parse().unwrap()
 }
 
-/// Runs the world of a seed; returns broken invariants and results.
+/// Runs a dive in the world of a seed; returns its broken invariants and its results.
 fn lived(folder: &Folder, seed: u64, sabotage: Option<Sabotage>) -> (Vec<String>, DiveResult) {
     let lived = World::sabotaged(seed, sabotage).live();
     let replayed = lived.replay(folder);

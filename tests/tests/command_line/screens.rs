@@ -26,7 +26,7 @@ fn on_terminal(folder: &Folder, columns: u16) -> String {
 }
 
 #[test]
-fn no_line_wraps_at_sixty_columns_or_at_any_width() {
+fn no_line_wraps_on_terminals_of_60_to_200_columns() {
     let folder = dive();
     for columns in [60, 100, 200] {
         let written = on_terminal(&folder, columns);

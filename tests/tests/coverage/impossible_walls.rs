@@ -25,7 +25,7 @@ fn observed(report: &Value) -> Vec<&Value> {
 }
 
 #[test]
-fn profile_contradicted_by_returns_never_passes_and_is_reported_once() {
+fn wall_with_a_contradicted_profile_never_passes_and_is_reported_once() {
     let vehicle = VEHICLE.replace("[water]", "[navigation]\nway = \"direct\"\n\n[water]");
     let as_built = "\n[tunnel.as_built]\nprofile = \"rectangle\"\nwidth_m = 7.6\nheight_m = 7.6\n";
     let (right, _) = dive(&vehicle, SCENE);

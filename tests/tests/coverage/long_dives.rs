@@ -71,8 +71,8 @@ fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
     println!("{passed} sections pass; D off by {off_m:?} m; {used:?} bytes");
     assert!(off_m[1] <= off_m[0] + 0.01, "{off_m:?}");
     found("loop.rounds", off_m[1], 0.02);
-    // Memory growth between two minutes: from a third of the parked hour to its end, and from three quarters of the
-    // rounds to their end.
+    // Memory growth over two spans: from a third of the parked hour to its end, and from three quarters of the rounds
+    // to their end.
     let parked = PARKED_S as usize / 60;
     let rounds = used.len() - 3 - parked;
     let grown = |from: usize, to: usize| used[to] as f64 / used[from] as f64 - 1.0;

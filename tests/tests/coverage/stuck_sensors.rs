@@ -54,8 +54,8 @@ fn dive(scene: &Scene) -> Told {
     }
 }
 
-/// The fault can't be detected within its first second. The margin that passed sections must have covers the fault's
-/// effect in this second.
+/// The fault can't be detected within its first second. Its effect in this second is smaller than the margin with which
+/// a section must pass.
 #[test]
 fn stuck_inertial_unit_is_reported_and_no_section_far_over_the_target_passes() {
     let (mut passed, mut over) = (0, 0);

@@ -142,7 +142,7 @@ fn one_stuck_head_of_several_is_reported_and_the_others_are_used() {
 }
 
 #[test]
-fn recovered_head_counts_again() {
+fn recovered_head_is_used_again() {
     let dive = dive(3, "stuck_range = { sensors = [\"sonar_1\"], from_s = 60, to_s = 120 }\n");
     assert_eq!(named(&dive, "sonar_1").len(), 1);
     let doubtful: Vec<f64> = dive

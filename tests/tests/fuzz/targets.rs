@@ -111,7 +111,8 @@ impl Surroundings {
             .collect()
     }
 
-    /// Feeds from a mapping of the given topics. Only the topics of profiling heads use stamps.
+    /// Maps the given topics to sensors; returns the feeds. Only topics of profiling heads take their times from header
+    /// stamps.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
         let text = there.fold(String::new(), |text, (topic, sensor)| {

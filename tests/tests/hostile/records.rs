@@ -4,17 +4,17 @@
 
 pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// A record.
+/// A record: opcode, length and content.
 pub(crate) fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode], (body.len() as u64).to_le_bytes().as_slice(), body].concat()
 }
 
-/// A text with its length.
+/// A text, preceded by its length.
 pub(crate) fn text(text: &str) -> Vec<u8> {
     [&u32::try_from(text.len()).unwrap().to_le_bytes(), text.as_bytes()].concat()
 }
 
-/// A map with its length.
+/// A map, preceded by its length.
 pub(crate) fn map(entries: impl Iterator<Item = (String, String)>) -> Vec<u8> {
     let body: Vec<u8> = entries.flat_map(|(key, value)| [text(&key), text(&value)].concat()).collect();
     [&u32::try_from(body.len()).unwrap().to_le_bytes(), body.as_slice()].concat()

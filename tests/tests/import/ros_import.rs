@@ -257,7 +257,7 @@ fn state_three_more(bytes: &mut [u8]) {
 }
 
 #[test]
-fn messages_below_the_stated_count_are_reported() {
+fn fewer_messages_than_stated_are_reported() {
     let folder = folder("");
     let (code, said) = changed(&folder, "humble.mcap", |bytes| state_three_more(bytes));
     assert_eq!(code, Some(3), "{said}");

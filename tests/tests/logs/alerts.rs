@@ -285,7 +285,7 @@ fn commands_from_any_thread_reach_the_loop() {
 }
 
 #[test]
-fn recorded_acknowledgements_replay_and_verify_as_equal() {
+fn recorded_acknowledgements_are_equal_in_replay_and_verify() {
     let scene = scenes::scene(SCENE);
     let folder = Folder::new();
     let console = SourceInfo { id: CONSOLE_ID.to_owned(), plugin: String::new(), connect: String::new() };

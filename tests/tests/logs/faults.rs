@@ -104,7 +104,7 @@ fn failed_recording_is_reported_live_and_until_the_end() {
 }
 
 #[test]
-fn full_medium_leaves_a_truncated_log() {
+fn full_disk_leaves_a_truncated_log() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;

@@ -194,7 +194,7 @@ fn playback_waits_at_the_end_for_a_seek() {
     ];
     let (stops, ended) = play(&folder, "ticks.mcap", &commands, Duration::from_millis(5));
     let at = |(at, tick, digest): (MonoNs, u64, u64), ended| (at, tick, digest, ended);
-    // Playback stops each time when it reaches the end or is resumed there.
+    // Playback stops each time it reaches the end or is resumed there.
     let expected = [
         at(before, false),
         at(last, false),

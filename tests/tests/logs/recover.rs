@@ -1,5 +1,4 @@
-//! Damaged logs and full disks. Checks exit codes and messages, and that the remaining log replays to the same
-//! digest.
+//! Damaged logs and full disks. Checks exit codes and messages, and that the recovered log replays to the same digest.
 
 use std::process::Command;
 

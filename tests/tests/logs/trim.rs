@@ -52,7 +52,7 @@ fn trim_without_a_cut_keeps_the_dive_and_its_results() {
         [("copy.mcap", &[][..]), ("echoless.mcap", &["--drop-echoes"]), ("public.mcap", &["--anonymise"])]
     {
         let told = trim(&folder, name, further);
-        // Alerts contain people's names.
+        // Alerts contain people's names, so an anonymous log leaves them out.
         let leaves_out = told["results_left_out"].as_u64().unwrap() > 0;
         assert_eq!((told["cut"].as_u64(), leaves_out), (Some(0), name == "public.mcap"), "{told}");
         assert_eq!(folder.digest(name, &[]), digest, "{name}");

@@ -216,7 +216,7 @@ fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     }
 }
 
-/// A log without a stationary phase gives no mounts and no zeros. A very short log gives no result at all.
+/// Without a stationary phase in the log, no mount and no zero is found. In a very short log, nothing is found.
 #[test]
 fn calibrate_without_a_stationary_phase_says_so() {
     let folder = folder(false, &filed(), "");

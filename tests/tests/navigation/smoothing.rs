@@ -172,7 +172,7 @@ fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64)
 }
 
 #[test]
-fn smoothing_bridges_a_silence_from_both_sides() {
+fn smoothing_bridges_a_silence_with_readings_from_before_and_after() {
     let scene = field(3, 33.0);
     let from_s = 80.0;
     // The silence of all sonars is short. Without walls, the filter drops its estimate after half a minute, and then

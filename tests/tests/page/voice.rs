@@ -321,7 +321,7 @@ fn voice_note_is_in_the_log_part_of_its_time() {
     speak(7, &audio[0]);
     // No device is connected, so the dive records nothing but operator commands.
     while !folder.path("parts/dive.part002.mcap").exists() {
-        // This is the largest rate that an operator is allowed.
+        // The commands come as fast as the page allows an operator to send them.
         let (status, answer) = serving.ask("POST", "/actions/silence", &[], "{}");
         assert!([200, 429].contains(&status), "{answer}");
     }

@@ -105,7 +105,7 @@ fn frame_carries_the_kernel_receive_time() {
 
 #[test]
 #[ignore = "needs a kernel with vcan: tests/vm/run"]
-fn can_reader_gets_one_error_at_down_and_frames_after_up() {
+fn can_reader_gets_one_error_on_interface_down_and_frames_after_up() {
     let vcan = Interface::up("vcan6");
     let (sender, reader) = (vcan.socket(), vcan.socket());
 

@@ -184,7 +184,8 @@ fn splits_and_delays_of_a_stream_do_not_change_readings_or_times() {
             let (mut parts, mut rest, mut at) = (Vec::new(), stream.as_slice(), START);
             while !rest.is_empty() {
                 let (now, later) = rest.split_at((1 + random.below(longest)).min(rest.len()));
-                // Not every single byte is followed by a long pause, because that would take hours.
+                // If the parts are single bytes, only some of them get a long delay, because the data would otherwise
+                // last for hours.
                 at = at
                     + if longest > 2 || random.one_in(50) {
                         delay(&mut random)

@@ -89,14 +89,14 @@ fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {
 }
 
 #[test]
-fn byte_splits_do_not_change_finite_readings() {
+fn readings_are_finite_and_do_not_depend_on_byte_splits() {
     let lines = lines();
     few("codecs", &|case| decoding(case, &lines));
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn byte_splits_do_not_change_finite_readings_in_a_long_run() {
+fn readings_are_finite_and_do_not_depend_on_byte_splits_in_a_long_run() {
     let lines = lines();
     many("codecs", &|case| decoding(case, &lines));
 }

@@ -123,8 +123,8 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
         let arc_m = case.unit() * profile.perimeter_m();
         let place = profile.point_at(arc_m);
         let back = profile.point_at(profile.arc_of(place));
-        // Directions are compared instead of arc lengths: all points of an edge that points at the reference point
-        // share one direction.
+        // Directions are compared instead of arc lengths, because all points of an edge towards the reference point
+        // have the same direction.
         let [to, from] =
             [place, back].map(|at| [at[0] - profile.reference()[0], at[1] - profile.reference()[1]]);
         let turned_rad = math::atan2(to[0] * from[1] - to[1] * from[0], to[0] * from[0] + to[1] * from[1]);

@@ -428,7 +428,7 @@ fn impossible_layout_is_a_named_error() {
 }
 
 #[test]
-fn step_not_above_zero_is_a_named_error_in_either_layout() {
+fn step_of_zero_or_less_is_a_named_error_in_both_layouts() {
     for (layout, step_rad) in [PhaseShift, SectorOffset].into_iter().flat_map(|l| [(l, 0.0), (l, -0.1)]) {
         let head = HeadSpec { step_rad, ..Rig::new(&[0.0], |_| false, 8.0).specs()[0] };
         assert!(programs(&[head; 2], layout, 0.2).is_err(), "{layout:?} in steps of {step_rad}");

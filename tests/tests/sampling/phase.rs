@@ -59,7 +59,7 @@ fn one_head_and_heads_in_sectors_have_no_phase_error() {
 }
 
 #[test]
-fn alternatives_are_given_for_each_mode_with_the_time_they_need() {
+fn alternatives_list_every_mode_with_the_time_that_it_needs() {
     let timed = format!("dive_hours = 12\n{VEHICLE}");
     let advice = advice(PLANNED_MPS, &timed);
     let last = advice.last().unwrap();

@@ -70,7 +70,7 @@ fn hits(holes: &[(f64, f64)], seed: u64, times: std::ops::Range<f64>) -> Vec<usi
 }
 
 #[test]
-fn boulders_of_size_d_are_hit_once_and_boulders_of_two_d_are_hit_twice() {
+fn boulders_of_size_d_are_hit_at_least_once_and_of_size_2_d_at_least_twice() {
     let holes = holes();
     let least = |hits: &[usize]| *hits.iter().min().unwrap();
     let of_d = hits(&holes, 1, 1.01..1.3);
