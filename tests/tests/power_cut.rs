@@ -50,7 +50,7 @@ fn wall_clock() -> Instant {
     Instant::now()
 }
 
-/// Results of the kills.
+/// Counts over all kills.
 #[derive(Default)]
 struct Count {
     /// Number of kills before the log had a header.
@@ -59,10 +59,10 @@ struct Count {
     after: AtomicUsize,
     /// Number of lines displayed more than a second before the kill.
     lines: AtomicUsize,
-    /// Number of results that were identical, bit for bit.
+    /// Number of results in the logs that a replay repeated bit for bit.
     same: AtomicU64,
-    /// Longest delay with which the disk or processor of this machine served a thread, ns. Other work may use both at
-    /// the same time.
+    /// Longest time for which a thread waited for this machine's disk or processor, ns. Other work may use both at the
+    /// same time.
     late_ns: AtomicU64,
 }
 
@@ -89,8 +89,7 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
         out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
     });
     std::thread::sleep(after);
-    // The second before the kill counts from this moment, after which the kill may take effect, and not from the
-    // moment of sending it.
+    // The second before the kill is counted from this moment, because the kill takes effect at some time after it.
     let moment = wall_clock();
     let ended = dive.try_wait().unwrap().is_some();
     dive.kill().ok();

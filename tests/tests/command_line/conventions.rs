@@ -132,7 +132,7 @@ fn report_is_complete_on_a_non_blocking_pipe() {
 }
 
 #[test]
-fn report_to_a_named_pipe_fails_without_a_reader_and_is_complete_with_one() {
+fn report_to_a_named_pipe_is_complete_with_a_reader_and_fails_without() {
     use rustix::fs::{CWD, FileType, Mode, mknodat};
     let folder = Folder::with_dive();
     mknodat(CWD, folder.path("pipe"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
@@ -150,7 +150,7 @@ fn report_to_a_named_pipe_fails_without_a_reader_and_is_complete_with_one() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn too_little_address_space_is_refused_without_an_abort() {
+fn lack_of_address_space_gives_an_error_and_no_abort() {
     let folder = Folder::with_dive();
     let headrace = program();
     for limit_kib in [100_000, 150_000, 200_000] {

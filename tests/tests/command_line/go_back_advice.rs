@@ -1,5 +1,5 @@
-//! Advice to a pilot who goes back for a missed stretch. Statements aren't repeated, no needless speed limit appears,
-//! and the end of the stretch is clear.
+//! Advice to a pilot who goes back for a missed stretch. The stretch is announced once and cleared once. No needless
+//! speed limit appears on the way.
 
 use headrace_tests::{Folder, root};
 use serde_json::Value;
@@ -69,7 +69,7 @@ fn there_and_back(there_mps: f64) -> Vec<Value> {
 }
 
 #[test]
-fn no_speed_is_too_fast_over_passed_wall_or_on_the_way_back() {
+fn too_fast_is_not_raised_over_wall_with_a_pass_or_while_reversing() {
     let lines = there_and_back(0.09);
     let conditions_there = conditions(&lines, false, [7.0, 13.0]);
     assert!(conditions_there.iter().all(|condition| *condition != "passed"), "{conditions_there:?}");
@@ -94,7 +94,8 @@ fn speed_limit_returns_before_the_heads_reach_new_wall() {
         .filter(|state| state["speed_mps"].as_f64().is_some_and(|mps| mps > 0.25))
         .collect();
     let first = again.iter().find(|state| state["condition"] == "too_fast").unwrap();
-    // The front heads are 0.55 m ahead of the vehicle's origin, so they have sampled the wall that far ahead of it.
+    // The front heads are 0.55 m ahead of the vehicle's origin, so they have sampled the wall up to 0.55 m beyond the
+    // turning point.
     let x_m = figure(&first["position"], "chainage_m");
     assert!((9.0..11.5).contains(&x_m), "{x_m}");
     assert!(again.iter().any(|state| state["condition"] == "passed"));
@@ -114,7 +115,7 @@ fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
     )
 }
 
-/// The displayed position is that of the vehicle's origin, which has heads before and behind it.
+/// The displayed position is that of the vehicle's origin. Heads are mounted ahead of it and behind it.
 #[test]
 fn following_the_go_back_advice_clears_every_missed_section() {
     let end = |lines: &[Value]| of(lines, "end")[0]["summary"]["fail_m"].as_f64().unwrap();

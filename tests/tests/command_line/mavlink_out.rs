@@ -1,5 +1,5 @@
-//! Checks `--mavlink-out` from the view of a ground station. A decoder made from the MAVLink guide reads the bytes,
-//! independently of headrace's decoder.
+//! Checks the messages of `--mavlink-out` as a ground station receives them. They are read with a decoder that was
+//! written from the MAVLink guide, independently of headrace's decoder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::UdpSocket;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use headrace_tests::{Folder, root};
 
-/// Names that QGroundControl takes for values of the autopilot.
+/// Names that QGroundControl would mistake for values of the autopilot.
 const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
@@ -123,7 +123,7 @@ fn ground_station_receives_heartbeats_values_and_each_alert_once() {
     );
     assert!(limits.iter().any(|mps| (0.2..0.35).contains(mps)), "{limits:?}");
     assert!(values("HR_MISS_M").iter().any(|m| *m > 2.0));
-    // Texts in several parts are joined by their id.
+    // Parts of a long text have the same id and are joined.
     let mut texts: BTreeMap<(usize, u16), String> = BTreeMap::new();
     for (place, said) in of(253).enumerate() {
         let id = u16::from_le_bytes([said.payload[51], said.payload[52]]);
@@ -141,7 +141,7 @@ fn ground_station_receives_heartbeats_values_and_each_alert_once() {
 }
 
 #[test]
-fn invalid_addresses_are_refused_with_the_valid_forms() {
+fn invalid_address_error_lists_the_valid_forms() {
     let folder = Folder::with_dive();
     for to in ["14550", "nowhere", "tcp:127.0.0.1:5760"] {
         let answer = folder.headrace(&["replay", "dive.mcap", "--mavlink-out", to]);

@@ -101,7 +101,7 @@ fn wrong_report_violates_the_schema() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// Units by the ending of a key, with their names in descriptions.
+/// Endings of keys with their units. A key's description must contain the unit.
 const UNITS: [(&str, &str); 11] = [
     ("_ratio", "without unit"),
     ("nis", "without unit"),

@@ -95,7 +95,7 @@ fn keys_seek_in_a_replay_and_end_it() {
     assert!(!screen.terminal().screen().hide_cursor() && !screen.terminal().screen().alternate_screen());
 }
 
-/// An exit: its name, its action, and whether the program ends regularly.
+/// A way to end the program: its name, its action, and whether the program then ends regularly.
 type Way<'a> = (&'a str, &'a dyn Fn(&mut Screen), bool);
 
 #[test]

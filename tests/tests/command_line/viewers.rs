@@ -1,7 +1,7 @@
-//! Checks dive logs from the view of other viewers, with the plain `mcap` crate.
+//! Checks that other programs can display dive logs. The tests read the logs with the plain `mcap` crate.
 //!
 //! Every message under `/result/view/` must match its channel's schema and the loop's published results. Summary and
-//! indexes must be right, and a replay must ignore these messages. `tests/viewers/` has checks with other readers.
+//! indexes must be right, and a replay must ignore these messages. `tests/viewers/` checks the logs with other readers.
 
 use std::collections::BTreeMap;
 

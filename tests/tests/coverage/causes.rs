@@ -9,7 +9,7 @@ use headrace_tests::instrumented;
 const ALWAYS: &str = "[effects.motion_within_turn]\n[effects.range_noise]\nsd_m = 0.01\n\
     [effects.imu_noise]\ngyro_degps_rthz = 0.005\n";
 const STEADY: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.185\n";
-/// Chainages away from the ends. Sections near the ends aren't passed by heads from both sides.
+/// Chainages away from the ends of the dive. Near the ends, some of the heads don't reach a section.
 const INNER_M: std::ops::Range<f64> = 5.5..13.0;
 const SEEDS: u64 = 2;
 
@@ -158,8 +158,8 @@ fn reported_cause_is_the_injected_one() {
     assert!(100 * right >= 95 * all, "{right} of {all}\n{table}");
 }
 
-/// Heads that are apart along the hull are in phase near the planned speed. A section can therefore fail below this
-/// speed and pass at it. The cause is then the phase.
+/// Heads that are apart along the hull are in phase only near the planned speed. A section can therefore fail below
+/// this speed, although it passes at this speed. The cause is then the phase.
 #[test]
 fn section_that_passes_only_at_a_higher_speed_fails_because_of_phase() {
     let driven = |speed_mps: f64| {

@@ -10,7 +10,7 @@ const DIVES: u64 = 8;
 /// vehicle at 0.2 m/s.
 const SPEED_OFF_MPS: f64 = 0.2;
 
-/// Legs of a dive: distance, m, speed, m/s, and duration of the stop at the end, s.
+/// Legs of a dive, each with its distance (m), its speed (m/s), and the duration of the stop at its end (s).
 type Legs = &'static [(f64, f64, f64)];
 const STEADY: Legs = &[(14.0, 0.2, 0.0)];
 const STOP_AND_GO: Legs = &[(3.0, 0.3, 6.0), (2.0, 0.2, 11.0), (4.0, 0.31, 4.0), (3.0, 0.25, 0.0)];
@@ -47,7 +47,7 @@ struct Wrong {
     /// Number of sections that pass with a true hole over 1.1 T, and number that fail with a true hole below 0.9 T.
     passed: usize,
     failed: usize,
-    /// Number of sections with the verdict can't say, and number of all sections.
+    /// Number of sections with the verdict `cannot_say`, and number of all sections.
     cannot_say: usize,
     sections: usize,
 }
@@ -75,7 +75,7 @@ fn wrong(scene: &Scene, most_mps: f64) -> Wrong {
     wrong
 }
 
-/// Wrong results over all dives of a kind, and the share of sections with the verdict can't say.
+/// Wrong results over all dives of a kind, and the share of sections with the verdict `cannot_say`.
 fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     let most_mps = legs.iter().fold(0.0, |most: f64, (_, speed_mps, _)| most.max(*speed_mps));
     let mut all = Wrong::default();
@@ -94,8 +94,8 @@ fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     (all, share)
 }
 
-/// If the cable swings by 11 cm but is declared taut, many sections stay undecided. This inertial unit can't
-/// distinguish a speed change of the cable by 5 cm/s from one of the vehicle. No section passes wrongly.
+/// If the cable swings by 11 cm but is declared taut, many sections stay undecided. This inertial unit can't tell
+/// whether a speed change of 5 cm/s is one of the cable or one of the vehicle. No section passes wrongly.
 #[test]
 fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
     let (wandering, swinging) = ([WANDERING, "0.06 m"], [SWINGING, "0.11 m"]);

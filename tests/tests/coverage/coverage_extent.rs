@@ -60,7 +60,8 @@ fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
 }
 
-/// Time at which a plane `behind_m` behind the vehicle is half a target beyond a section, seconds after the start.
+/// Time, in seconds after the start, when the plane `behind_m` behind the vehicle is past a section's end by half the
+/// target.
 fn left_s(section: &SectionRow, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
 }
@@ -82,8 +83,8 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
     for section in dark {
         fails_by_silence(section, &[0, 1, 2, 3]);
         let late_s = late_s(&report, section, HEAD_M);
-        // The latest moment allows for one update and the position margin. At the earliest, the flag is raised when
-        // the section's start is left, since a circle about that start may be large enough.
+        // The upper limit allows for one update and the position margin. The flag may be raised as soon as the
+        // section's start is left, because a circle centred there may exceed the target.
         assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
     let home = report.go_back.iter().map(|back| back.from_m).fold(0.0, f64::max);
@@ -95,7 +96,7 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
 }
 
 #[test]
-fn stretch_between_loss_and_return_of_heads_fails() {
+fn stretch_crossed_while_all_heads_are_silent_fails() {
     // The heads are dead while the vehicle moves from 5.75 m to 8.5 m.
     let report = steady(9.0, &silence(ALL, "from_s = 25\nfor_s = 25"));
     accounted_for("dead and back", &report);
@@ -182,7 +183,8 @@ fn flags_wait_only_for_live_heads() {
     assert!(inner.len() > 10);
     for section in inner {
         fails_by_silence(section, &[1, 2, 3]);
-        // The flag follows the live front head, which leaves the section ten seconds before the silent aft heads do.
+        // The flag waits only for the live front head. This head leaves the section ten seconds before the silent aft
+        // heads.
         let late_s = late_s(&report, section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
@@ -254,7 +256,8 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
         let what = format!("seed {seed}");
         accounted_for(&what, report);
         let Some(to_m) = report.coverage_extent.to_m else { continue };
-        // Heads are at most 0.6 m ahead of or behind the vehicle. A section counts as left after half the target.
+        // Heads are at most 0.6 m ahead of or behind the vehicle. A section counts as left when the heads are past its
+        // end by half the target.
         let (target_m, section_m) = (report.target_m, report.section_m);
         let seen_m = dive.samples().map(|sample| sample.place[0]).fold(f64::NEG_INFINITY, f64::max);
         let far = |s: &&SectionRow| s.start_m > seen_m + target_m;
@@ -276,7 +279,7 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
 }
 
 #[test]
-fn stretch_without_a_position_counts_and_fails_when_left() {
+fn stretch_without_a_position_fails_once_the_vehicle_has_left_it() {
     // Some seconds after the cable counter falls silent, the filter has no fix any more.
     let report = steady(12.0, &silence("\"tether\"", "from_s = 25\nfor_s = 50"));
     accounted_for("outage", &report);
@@ -287,7 +290,7 @@ fn stretch_without_a_position_counts_and_fails_when_left() {
 }
 
 #[test]
-fn dive_without_a_position_judges_nothing_and_says_so_first() {
+fn dive_without_a_position_has_no_verdicts_and_says_so_first() {
     for (sensor, lacking, words) in [("tether", "no_chainage", "chainage"), ("imu", "no_heading", "heading")]
     {
         let folder = Folder::new();
@@ -341,8 +344,8 @@ fn dive_mostly_without_a_position_exits_with_1() {
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
 }
 
-/// Samples from before the position estimate has converged don't affect later sections. A vehicle that waits for a
-/// known heading loses only the metres that its front heads sampled while it waited.
+/// Samples from before the position estimate has converged don't affect later sections. If a vehicle waits until its
+/// heading is known, only the wall that its front heads sampled meanwhile stays undecided.
 #[test]
 fn waiting_for_a_known_heading_leaves_at_most_25_cm_undecided() {
     let vehicle = VEHICLE.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.09");

@@ -54,8 +54,8 @@ fn passed_sections_are_within_the_target() {
     }
 }
 
-/// On walls as rough as the vehicle file allows, errors of D match their standard deviation, which is neither too
-/// small nor too large. An echosounder sees the same bump for seconds, which must not look like a change of position.
+/// On walls as rough as the vehicle file allows, the reported standard deviation of D is neither too small nor too
+/// large. An echosounder sees the same bump for seconds. The filter must not take the bump for a change of position.
 #[test]
 fn wall_bumps_do_not_bias_the_position() {
     for name in ["vita2-4", "pipe", "bluerov2"] {
@@ -87,7 +87,8 @@ fn initial_stop_gives_earlier_verdicts() {
     assert!(stood <= 0.02, "share of undecided metres: {stood} with a stop, {at_once} without");
 }
 
-/// If every verdict is pass, all false passes are counted. If every verdict is fail, all false fails are counted.
+/// With every verdict set to pass, all false passes are counted. With every verdict set to fail, all false fails are
+/// counted.
 #[test]
 fn field_statistics_count_all_false_passes_and_false_fails() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();

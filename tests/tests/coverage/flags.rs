@@ -14,8 +14,8 @@ use headrace_tests::random_dives::{Kind, Seeded};
 
 use crate::dives::DIVES;
 
-/// A dive with the flags that are due for two definitions of a fail. The hole exceeds the target, or it exceeds the
-/// target by two standard deviations.
+/// A dive and its due flags by two definitions of a fail: the hole exceeds the target, or it exceeds the target by two
+/// standard deviations.
 struct Judged {
     seeded: &'static Seeded,
     dive: &'static Dive,
@@ -33,7 +33,7 @@ static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
     DIVES.iter().map(judge).collect()
 });
 
-/// Checks every section with `wrong`, which gets the section's due flags for both definitions and may return an
+/// Checks every section with `wrong`. This function gets the section's due flags by both definitions, and may return an
 /// error.
 #[track_caller]
 fn every_flag(
@@ -53,8 +53,7 @@ fn every_flag(
     assert!(said.is_empty(), "{} of {raised} flags: {:#?}", said.len(), &said[..said.len().min(8)]);
 }
 
-/// Longest additional delay, s. A flag waits until the heads have passed the section's end or the vehicle is
-/// stationary.
+/// Longest additional delay, s. A flag waits until the heads are past the section's end or the vehicle is stationary.
 const SOON_S: f64 = 3.0;
 
 /// Whether a flag was raised before its due moment, or raised although none was due.
@@ -167,7 +166,7 @@ fn filled_hole_has_no_flag() {
 }
 
 #[test]
-fn turning_back_later_does_not_change_flags_of_the_way_out() {
+fn flags_of_the_way_out_do_not_depend_on_a_later_way_back() {
     every_flag(
         |judged| judged.seeded.kind == Kind::Reversing && direct(judged),
         |judged, due, _| {
@@ -186,8 +185,7 @@ fn end_of_a_dive_raises_no_flag() {
 
 #[test]
 fn no_flag_is_raised_while_the_fail_can_still_be_undone() {
-    // Dives with a filter are left out. Their standard deviation differed from the final one when the flag was
-    // raised.
+    // Dives with a filter are left out, because their standard deviations still change after a flag is raised.
     every_flag(
         |judged| forward(judged) && direct(judged),
         |judged, _, due| is_early(judged, due).then_some("raised though going on could have undone it"),

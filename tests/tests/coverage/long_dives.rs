@@ -16,7 +16,7 @@ const FROM_M: f64 = 5.0;
 const TO_M: f64 = 9.0;
 /// Chainage of the end of the dive, m.
 const END_M: f64 = 16.0;
-/// Largest distance between a hole's bounds if samples in full cells are thinned out, m.
+/// Largest difference between the bounds of a hole if samples in full cells are thinned out, m.
 const THINNED_M: f64 = 0.04;
 
 fn scene(parked_s: u32, rounds: usize) -> String {
@@ -61,7 +61,7 @@ fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
             panic!("section {}: no bounds", b.report.start_m)
         };
         assert!(most_m - least_m <= THINNED_M, "section {}: {least_m} to {most_m}", b.report.start_m);
-        // For sections passed after the long phase, the hole is as close to the truth as without that phase.
+        // Sections beyond the long phase have holes as close to the truth as without that phase.
         if a.report.start_m >= TO_M + 1.0 {
             for (off_m, section) in off_m.iter_mut().zip([a, b]) {
                 *off_m = off_m.max((section.report.hole_m.unwrap() - section.true_hole_m).abs());
@@ -72,8 +72,8 @@ fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
     println!("{passed} sections pass; D off by {off_m:?} m; {used:?} bytes");
     assert!(off_m[1] <= off_m[0] + 0.01, "{off_m:?}");
     found("loop.rounds", off_m[1], 0.02);
-    // Memory growth between two minutes: from a third of the parked hour to its end, and from three quarters of the
-    // rounds to their end.
+    // Memory growth over two spans: from a third of the parked hour to its end, and from three quarters of the rounds
+    // to their end.
     let parked = PARKED_S as usize / 60;
     let rounds = used.len() - 3 - parked;
     let grown = |from: usize, to: usize| used[to] as f64 / used[from] as f64 - 1.0;

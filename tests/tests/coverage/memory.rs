@@ -21,7 +21,7 @@ fn used(dive: &Loop) -> [usize; 2] {
 }
 
 #[test]
-fn stationary_vehicle_does_not_grow_memory() {
+fn memory_does_not_grow_while_the_vehicle_is_stationary() {
     let scene = scenes::scene(SCENE);
     let mut app = App::new(Mission { length_m: 100.0, ..scene.vehicle.mission() });
     for sensor in &scene.vehicle.sensors {

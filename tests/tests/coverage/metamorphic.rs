@@ -201,7 +201,7 @@ fn tick_length_does_not_change_results() {
     }
 }
 
-/// The vehicle file with another order of heads, which are its first sensors.
+/// The vehicle file with its heads in another order. The heads are the first sensors in the file.
 fn reordered(vehicle: &str, heads: usize) -> String {
     let mut tables: Vec<&str> = vehicle.split("[[sensors]]\n").collect();
     tables[1..=heads].reverse();

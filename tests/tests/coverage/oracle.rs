@@ -70,7 +70,7 @@ fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section passed with the samples of only some visits. Samples of other visits can only make its hole
+/// Whether a section passed on the samples of some visits alone. Samples of the other visits can only make its hole
 /// smaller.
 fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
     let most_m = section.hole_most_m.filter(|_| section.verdict == Verdict::Pass);
@@ -120,11 +120,12 @@ fn verdicts_follow_from_hole_sigma_and_target() {
         let radius_m = f64::midpoint(target_m, twice_m);
         let ends = [section.start_m, section.end_m];
         let first_m = first_failing_m(wall, ends, radius_m, passed_m);
-        // Whether a circle touches the limit of the part that all heads have passed.
+        // Whether a circle touches the end of the stretch that all heads have crossed.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
-        // The first failing place is accurate to one part of the section ([`PARTS`]). The program uses the largest
-        // standard deviation round the wall, and takes the farthest wall as the reach of a tilted head.
+        // Tolerance for differences between oracle and program. The oracle finds the first failing place to within one
+        // part of the section ([`PARTS`]). The program uses the largest standard deviation round the wall, and computes
+        // the reach of a tilted head from the farthest wall.
         let near_m = (section.end_m - section.start_m) / f64::from(PARTS) + 2.0 * section.hole_sd_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
@@ -258,7 +259,8 @@ fn holes_of_small_sets_match_a_dense_search() {
             .fold(0.0, f64::max);
         let exact = wall.largest(0.0, 0.5).unwrap();
         let short_m = exact.radius_m - dense_m;
-        // The distance to the nearest sample changes by no more than the distance to the nearest grid point.
+        // A point's distance to its nearest sample differs from that of the nearest grid point by no more than the
+        // distance between the two points.
         assert!((-1e-12..=step_m / math::sqrt(2.0)).contains(&short_m), "{seed}: {exact:?}, {dense_m}");
     }
 }
@@ -316,7 +318,7 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // After a missing return, the next turn finds no pass over the two steps beside it, and T_y spans the gap.
+    // Without this return, the pings beside its angle have no T_x in the next turn, and T_y spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

@@ -34,8 +34,8 @@ const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}
      imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
 
-/// Setting that is reported in a dive of 100 m by a pilot who wanders slightly. `truly` describes the simulated
-/// vehicle, and `told` is the vehicle file that headrace reads.
+/// Returns the setting that is reported as wrong in a dive of 90 m with a pilot who wanders slightly. `truly` describes
+/// the simulated vehicle, and `told` is the vehicle file that headrace reads.
 fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingJson> {
     told_swinging(truly, told, [aside_m, 3.0], seed)
 }
@@ -76,7 +76,7 @@ fn head_turned_about_its_axis_is_reported_with_angle() {
     }
 }
 
-/// The error changes the ranges while the vehicle yaws back and forth. With a single head it looks like a heading
+/// Such an error changes the ranges while the vehicle yaws back and forth. With a single head it looks like a heading
 /// error.
 #[test]
 fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {

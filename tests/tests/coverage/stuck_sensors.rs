@@ -55,10 +55,10 @@ fn dive(scene: &Scene) -> Told {
     }
 }
 
-/// The fault can't be detected within its first second. The margin that passed sections must have covers the fault's
-/// effect in this second.
+/// The fault can't be detected within its first second. Its effect in this second is smaller than the margin with which
+/// a section must pass.
 #[test]
-fn stuck_inertial_unit_is_reported_and_passes_nothing_over_the_target() {
+fn stuck_inertial_unit_is_reported_and_no_section_far_over_the_target_passes() {
     let (mut passed, mut over) = (0, 0);
     for (seed, start_m) in [(1, 2.0), (2, 3000.0), (3, 6900.0), (5, 6900.0)] {
         let [sound, hung] = ["", &hangs("imu", 100.0)]

@@ -19,7 +19,7 @@ fn committed() -> Wall {
     Wall::new(rest.lines().skip(1).map(place), perimeter_m).unwrap()
 }
 
-/// Bounds and D of the sections in a table.
+/// Start, end and D of the sections in a table, m.
 fn holes(table: &str) -> Vec<[f64; 3]> {
     let row = |line: &str| -> [f64; 3] {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
@@ -42,7 +42,7 @@ fn true_holes_match_another_program() {
 }
 
 #[test]
-fn other_program_still_gives_the_committed_table() {
+fn other_program_reproduces_the_committed_table() {
     let script = root().join("tests/oracles/holes.py");
     let has_scipy = Command::new("python3").args(["-c", "import scipy"]).output();
     if !has_scipy.is_ok_and(|output| output.status.success()) {

@@ -62,7 +62,7 @@ fn true_holes_match_a_fine_grid() {
     let strips = Strips::of(&dive.truth);
     let (along, around) = (5_u32, 720_u32);
     let mut judged = 0;
-    // The ends are left out: they are far from all samples, so that this search would take long.
+    // The ends are left out. They are far from all samples, so this search would take long there.
     for section in dive.sections.iter().filter(|section| section.true_hole_m < 1.5) {
         let [from_m, to_m] = [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
         let place = |i: u32, j: u32| {
@@ -149,9 +149,9 @@ fn returns_from_anything_except_the_wall_fill_no_hole() {
     }
 }
 
-/// A wrong cable count moves sections along the tunnel, and moves their true stretches by the same distance.
+/// A wrong cable count shifts a section along the tunnel. Its true hole is searched on the shifted stretch.
 #[test]
-fn true_stretches_follow_the_cable_error() {
+fn true_holes_are_searched_at_the_shifted_chainage_of_a_section() {
     let effects = "motion_within_turn = {}\ntether_slack = { reach_m = 0.4, period_s = 400 }\n";
     let dive = dive(16.0, effects);
     let most_m = dive.sections.iter().map(|section| section.shift_m.abs()).fold(0.0, f64::max);
@@ -165,7 +165,7 @@ fn true_stretches_follow_the_cable_error() {
 /// Heads with a minimum range of 10 cm receive echoes of their own vehicle, which hides a part of the wall. These
 /// echoes fill no hole.
 #[test]
-fn echoes_of_the_vehicle_pass_no_section() {
+fn no_section_passes_because_of_echoes_from_the_vehicle() {
     let load = |name: &str| {
         let text = String::from_utf8(scenes::vehicle_file(name)?).unwrap();
         let near = text.replace("min_range_m = 0.5", "min_range_m = 0.1");

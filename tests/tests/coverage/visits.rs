@@ -48,7 +48,7 @@ const STUCK: &str =
     "[[effects.device_faults]]\nsensors = [\"tether\"]\nkind = \"stick\"\nfrom_s = 60\nfor_s = 12\n";
 
 #[test]
-fn one_complete_visit_passes_sections_sampled_during_a_position_doubt() {
+fn section_sampled_during_a_position_doubt_passes_after_one_complete_visit() {
     let out = dive(4, &[(12.0, 0.09)], STUCK);
     let back = dive(4, &[(12.0, 0.09), (9.0, -0.09)], STUCK);
     let where_m = [8.0, 13.0];
@@ -73,7 +73,7 @@ fn drive_back_revokes_no_pass() {
 
 /// The vehicle is too fast on both visits, and the slack of the cable differs between them.
 #[test]
-fn two_visits_with_different_slack_pass_no_section_far_over_the_target() {
+fn no_section_far_over_the_target_passes_after_two_visits_with_different_slack() {
     let (mut over, mut wrong, mut passed) = (0, 0, 0);
     for seed in 0..10 {
         let dive =

@@ -43,7 +43,7 @@ fn dive(heads: usize, effects: &str) -> Dive {
     instrumented::dive(&pipe(heads), &format!("{CREEP}{effects}"))
 }
 
-/// Alerts about a head that isn't trusted.
+/// Alerts that report this head as untrusted.
 fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a ListedAlertJson> {
     let mut alerts = observed(&dive.report);
     alerts.retain(|alert| alert.sensor.as_deref() == Some(head));
@@ -108,7 +108,7 @@ fn compared(vehicle: &str, scene: &str, near_m: f64) -> Compared {
 }
 
 #[test]
-fn head_stuck_at_one_range_passes_nothing() {
+fn no_section_passes_with_a_head_stuck_at_one_range() {
     let sound = dive(1, "");
     assert!(sound.report.summary.pass_m > 5.0, "{:?}", sound.report.summary);
     let alone = dive(1, "stuck_range = { sensors = [\"sonar_0\"] }\n");
@@ -119,7 +119,7 @@ fn head_stuck_at_one_range_passes_nothing() {
 }
 
 #[test]
-fn one_stuck_head_of_several_is_reported_and_the_others_count() {
+fn one_stuck_head_of_several_is_reported_and_the_others_are_used() {
     for (heads, stuck, least_m) in [(2, 0, 1.0), (2, 1, 2.5), (3, 0, 2.0), (3, 1, 3.0)] {
         let id = format!("sonar_{stuck}");
         let effects = format!("stuck_range = {{ sensors = [\"{id}\"] }}\n");
@@ -132,7 +132,7 @@ fn one_stuck_head_of_several_is_reported_and_the_others_count() {
         let all = observed(&dive.report);
         assert!(all.iter().all(|alert| alert.sensor.as_deref().is_none_or(|head| head == id)), "{at}");
         assert!(dive.report.summary.pass_m >= least_m, "{at}");
-        // The stuck head's returns pass no section.
+        // Without the stuck head's returns, the hole of a passed section is still at most 1.1 times the target.
         let others = dive.samples_of(|head| head != stuck);
         let wall = Wall::new(others, dive.profile.perimeter_m()).unwrap();
         for section in dive.report.sections.iter().filter(|section| section.verdict == Verdict::Pass) {
@@ -143,7 +143,7 @@ fn one_stuck_head_of_several_is_reported_and_the_others_count() {
 }
 
 #[test]
-fn recovered_head_counts_again() {
+fn recovered_head_is_used_again() {
     let dive = dive(3, "stuck_range = { sensors = [\"sonar_1\"], from_s = 60, to_s = 120 }\n");
     assert_eq!(named(&dive, "sonar_1").len(), 1);
     let doubtful: Vec<f64> = dive
@@ -158,7 +158,7 @@ fn recovered_head_counts_again() {
 }
 
 #[test]
-fn constant_range_of_a_swaying_vehicle_is_reported_even_within_tolerance() {
+fn constant_range_on_a_swaying_vehicle_is_reported_even_within_tolerance() {
     let dive = dive(2, &format!("stuck_range = {{ range_m = 0.95, sensors = [\"sonar_1\"] }}\n{DRIFT}"));
     let alerts = named(&dive, "sonar_1");
     let constant = alerts.iter().find(|alert| alert.kind == "head_constant").unwrap();
@@ -167,7 +167,7 @@ fn constant_range_of_a_swaying_vehicle_is_reported_even_within_tolerance() {
 }
 
 #[test]
-fn noise_passes_nothing_and_one_noisy_head_of_two_is_reported() {
+fn no_section_passes_on_noise_and_one_noisy_head_of_two_is_reported() {
     let effects = |head: &str| format!("outliers = {{ share = 1, near_m = 0.1, sensors = [\"{head}\"] }}\n");
     let alone = dive(1, &effects("sonar_0"));
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);

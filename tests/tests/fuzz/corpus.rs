@@ -19,7 +19,7 @@ use crate::mutate::broken;
 /// Start time of the logs.
 const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// Number of the first sensor that belongs to the second vehicle.
+/// Lowest sensor number of the second vehicle.
 pub(crate) const OTHERS: u8 = 128;
 
 /// Kind of a file; it determines the reader.
@@ -76,8 +76,8 @@ pub(crate) struct File {
 
 pub(crate) struct Corpus {
     pub(crate) files: Vec<File>,
-    /// Messages of all intact logs. The messages of an intact log must all be found in its broken version, unless a
-    /// loss is reported.
+    /// Messages of each intact log. A broken version of a log must contain all of its messages, unless a loss is
+    /// reported.
     pub(crate) said: Vec<Said>,
 }
 
@@ -187,7 +187,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// Content that is unique for each number and varies in length.
+/// Message content that differs for each number and varies in length.
 fn content(number: u64) -> Vec<u8> {
     let mut random = Random(number);
     (0..=number % 40).map(|_| random.bits().to_le_bytes()[3]).collect()

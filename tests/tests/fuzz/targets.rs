@@ -89,7 +89,7 @@ impl Surroundings {
         Self { vehicle: read(VEHICLE), vehicles }
     }
 
-    /// One [`Taker`] for each sensor, which states the stream that the sensor's data comes from. In tables and ROS
+    /// One [`Taker`] for each sensor. It states the stream that contains the sensor's data. In tables and ROS
     /// recordings this is the stream with the sensor's name, and in other files the only stream.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {
@@ -111,7 +111,8 @@ impl Surroundings {
             .collect()
     }
 
-    /// Feeds from a mapping of the given topics. Only the topics of profiling heads use stamps.
+    /// Maps the given topics to sensors; returns the feeds. Only topics of profiling heads take their times from header
+    /// stamps.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
         let text = there.fold(String::new(), |text, (topic, sensor)| {
@@ -123,7 +124,7 @@ impl Surroundings {
     }
 }
 
-/// Tries a file with any content.
+/// Tries a file with arbitrary content.
 ///
 /// Errors: a description of the fault that the reader showed.
 pub(crate) fn try_one(
@@ -150,7 +151,7 @@ pub(crate) fn try_one(
     if !silent || !is_vouched_for(bytes) {
         return Ok(());
     }
-    // The broken file may also contain parts of other logs, but it must contain all messages of one intact log.
+    // The log reports no loss. So it must contain all messages of one intact log; it may also contain parts of others.
     let holds =
         |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
     if corpus.said.iter().any(holds) {
@@ -160,7 +161,8 @@ pub(crate) fn try_one(
     }
 }
 
-/// Whether every checksum is present. A checksum of zero is a missing one, so a changed byte can't be detected.
+/// Whether every checksum is present. A checksum of zero counts as missing; without one, a changed byte can't be
+/// detected.
 fn is_vouched_for(log: &[u8]) -> bool {
     let mut rest = &log[8..];
     while let Some((head, behind)) = rest.split_first_chunk::<9>() {
@@ -284,7 +286,8 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
 /// Imports a file into a log, and checks that the log is intact.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        // No importer reads these kinds, except ROS recordings, so all of them are tried as such.
+        // Of these kinds, only ROS recordings have an importer. So files of all these kinds are tried as ROS
+        // recordings.
         Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());
@@ -306,7 +309,7 @@ fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     written(kind, Input::new("file", Cursor::new(bytes.to_vec()), format), around)
 }
 
-/// A table of pressure and cable chainage, or of a head.
+/// Reads a table with pressure and cable chainage, or with the angles and ranges of a head.
 fn table(bytes: &[u8], around: &Surroundings) -> Option<Csv> {
     let columns = |columns: &[[&str; 4]]| {
         let head = "time_column = \"t\"\nutc = true\n".to_owned();

@@ -9,7 +9,7 @@ use crate::records::{
 pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
-    /// Words that a replay must report as a loss, because the log is damaged.
+    /// Words that the report of a replay must contain. Alternatives are separated by `|`.
     pub(crate) told: &'static str,
 }
 

@@ -18,7 +18,7 @@ const READING: [&[&str]; 7] = [
     &["recover", "odd.mcap", "-o", "recovered.mcap", "--force"],
 ];
 
-/// A new time, computed from a message's number and its time.
+/// Computes a new time from a message's number and its time.
 type Stamp<'a> = &'a dyn Fn(u64, u64) -> u64;
 
 /// Writes the dive with the times that `stamp` returns.

@@ -152,7 +152,7 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Leaves of a use tree, each with its local name and its path.
+/// Collects the leaves of a `use` tree, each with its local name and its path.
 fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str, Vec<&'a str>)>) {
     let (mut path, mut rest) = (around.to_vec(), tokens);
     while let [Word(word), Separator, behind @ ..] = rest {

@@ -41,7 +41,7 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
-/// The list of device kinds. It uses the core as devices do, and every crate of a device.
+/// The crate that lists all device kinds. It may use the core as a device's crate does, and every device's crate.
 const DEVICES: &str = "plugins/devices";
 
 /// Rust packages in the workspace `lab`.
@@ -94,7 +94,7 @@ fn dependencies_point_one_way() {
 }
 
 #[test]
-fn layer_rule_rejects_dependencies_that_point_back() {
+fn layer_rule_rejects_forbidden_dependencies() {
     let pairs = [
         ("core/sampling", "core/geometry", true),
         ("core/geometry", "core/sampling", false),
@@ -143,8 +143,8 @@ fn core_has_no_io_and_no_locks() {
     assert!(said.is_empty(), "{said:#?}");
 }
 
-/// A skip that is printed with `println!` isn't counted: Cargo hides the output of passed tests from
-/// `.ci/count-skipped`.
+/// A test must not print a skip with `println!`. Cargo hides the output of passing tests, so `.ci/count-skipped`
+/// wouldn't count it.
 #[test]
 fn skipped_tests_are_reported_only_by_the_helper() {
     // The text is split, so that this file itself isn't found.
@@ -219,7 +219,7 @@ fn readable(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every document must exist that any file refers to.
+/// Every document that a file mentions must exist.
 #[test]
 fn named_documents_exist() {
     let mut files = Vec::new();

@@ -21,7 +21,8 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// A folder with recordings, tables, the vehicle file and a mapping. Each table of the mapping contains `further`.
+/// A folder with recordings, tables, the vehicle file and a mapping. Each table of the mapping also contains the lines
+/// `further`.
 fn folder(further: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
@@ -133,7 +134,7 @@ fn recordings_of_all_kinds_match_the_tables() {
 }
 
 #[test]
-fn stamps_of_another_time_base_are_reported_and_can_be_used() {
+fn stamps_in_another_time_base_are_reported_and_usable_on_request() {
     let folder = folder("");
     folder.write("header.toml", mapping("time = \"header\""));
     assert_eq!(import(&folder, "boot_time.mcap", "header.toml").code, Some(0));
@@ -256,7 +257,7 @@ fn state_three_more(bytes: &mut [u8]) {
 }
 
 #[test]
-fn messages_below_the_stated_count_are_reported() {
+fn fewer_messages_than_stated_are_reported() {
     let folder = folder("");
     let (code, said) = changed(&folder, "humble.mcap", |bytes| state_three_more(bytes));
     assert_eq!(code, Some(3), "{said}");

@@ -1,7 +1,7 @@
 //! The same bytes in the same order give the same digest.
 //!
-//! The digest is the same live and in replay, for any tick length and speed, and with idle or busy cores. (.ci/run
-//! compares debug and release builds.)
+//! The digest is the same live and in replay, for any tick length, at any replay speed, and with idle or busy cores.
+//! (.ci/run compares debug and release builds.)
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -51,8 +51,7 @@ fn live_dive_and_its_replay_have_the_same_digest() {
     );
 }
 
-/// In this dive verdicts of failed sections become final, later passes clear flags, and verdicts depend on earlier
-/// verdicts.
+/// In this dive, fails become final, later passes clear flags, and verdicts depend on earlier verdicts.
 #[test]
 fn tick_length_does_not_change_failed_and_cleared_sections() {
     let folder = Folder::new();
@@ -96,7 +95,7 @@ fn each_difference_from_the_expected_report_is_named() {
     assert_eq!(places, ["/digest:", &section]);
 }
 
-/// A value may differ only if the golden report states a tolerance for it, and only within this tolerance.
+/// A value may differ from the golden report only within a tolerance that the golden report states for it.
 #[test]
 fn golden_report_may_state_tolerances() {
     let folder = Folder::with_dive();

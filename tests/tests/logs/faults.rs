@@ -1,4 +1,4 @@
-//! Media that fail during a recording, closed terminals, and the way in which these faults are reported.
+//! Disks that fail during a recording, and closed terminals. Each fault is reported.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 const DIVE: [&str; 4] = ["run", "vehicle.toml", "--source", "dive.mcap"];
 
-/// The program in a folder, started by another program such as strace.
+/// Runs the program in a folder through another program, such as strace.
 fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     let [above, options @ ..] = command else { panic!("no command") };
     let mut below = Command::new(above);
@@ -19,7 +19,7 @@ fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     below
 }
 
-/// Whether strace is available, which makes system calls of a process fail.
+/// Whether strace is available. It can make chosen system calls of a process fail.
 fn has_strace() -> bool {
     let can = Command::new("strace").args(["-o", "/dev/null", "true"]).output();
     let can = can.is_ok_and(|output| output.status.success());
@@ -104,7 +104,7 @@ fn failed_recording_is_reported_live_and_until_the_end() {
 }
 
 #[test]
-fn full_medium_leaves_a_truncated_log() {
+fn full_disk_leaves_a_truncated_log() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
@@ -196,7 +196,8 @@ fn unread_stderr_does_not_block_a_failing_recording() {
     assert!(losses(&report).contains("File too large"), "{}", losses(&report));
 }
 
-/// Waits until a dive has written to a file. An empty file doesn't count, because the program creates it as a test.
+/// Waits until a dive has written to a file. An empty file doesn't count, because the program creates one to test the
+/// folder.
 fn wait_for(path: &Path, dive: &mut Child) {
     wait_for_more(path, 0, dive);
 }
@@ -276,7 +277,7 @@ fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
             assert!(dive.try_wait().unwrap().is_none(), "{name} has ended the dive");
         }
         signal(end, &dive);
-        // Nobody reads the output any more, as if the terminal were closed.
+        // From here on, nobody reads the output, as if the terminal had been closed.
         drop(lines);
         // Exit code 1: nothing was inspected.
         assert_eq!(ended(dive), Some(1), "{end}");
@@ -311,8 +312,8 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
         let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        // Each sync makes the file longer, twice a second. After four syncs the file certainly contains data that can
-        // be lost.
+        // Twice a second, a sync makes the file longer. After four syncs, the file certainly contains data whose loss
+        // can be detected.
         (0..4).fold(0, |len, _| wait_for_more(&log, len, &mut dive));
         take();
         let output = dive.wait_with_output().unwrap();

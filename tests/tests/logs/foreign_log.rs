@@ -1,7 +1,7 @@
 //! Logs from any MCAP writer replay to the same digest as the headrace log of the same dive.
 //!
-//! Such a log has only the devices' data on /raw/ channels, in any compression, chunking and order. It has no vehicle
-//! file, no metadata, no ticks and no /sent/ channels.
+//! Such a log has only the devices' data on /raw/ channels, with any compression, chunk size and order of messages. It
+//! has no vehicle file, no metadata, no ticks and no /sent/ channels.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};

@@ -93,7 +93,7 @@ fn attached_vehicle_file_with_an_unknown_plugin_is_refused() {
     let answer = folder.headrace(&["replay", "foreign.mcap"]);
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
     insta::assert_snapshot!(answer.stderr, @r#"headrace: foreign.mcap/vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50; did you mean "bar100"?"#);
-    // With another vehicle file the log can be read, whatever plugin its channels name.
+    // With another vehicle file, the log can be read even if its channels name an unknown plugin.
     assert_eq!(replay(&folder, "foreign.mcap").code, Some(0));
 }
 

@@ -27,8 +27,8 @@ const COMMANDS: [&str; 7] = [
     r#"{"do":"nothing"}"#,
 ];
 
-/// All packets of a scene's devices. Every third packet of a byte stream is cut in two. So at any moment, some frame
-/// is incomplete.
+/// All packets of a scene's devices. Every third packet of a byte stream is cut in two, so that a snapshot often falls
+/// within a frame.
 pub(crate) fn packets(scene: &Scene) -> Vec<Packet> {
     let mut simulation = Simulation::new(scene).unwrap();
     let mut all = Vec::new();
@@ -81,7 +81,7 @@ fn goes_on_from_anywhere(scene: &Scene) {
     let packets = packets(scene);
     let (mut whole, mut other) = (armed(&scene.vehicle), armed(&scene.vehicle));
     let mut saved = whole.0.save().unwrap();
-    // The length of a stretch differs from every period in the dive.
+    // This number of packets per stretch is no multiple of any period in the dive.
     let stretch = packets.len() / 17 + 1;
     for (number, stretch) in packets.chunks(stretch).enumerate() {
         run(&mut whole, stretch);
@@ -105,7 +105,7 @@ fn goes_on_from_anywhere(scene: &Scene) {
     assert!(reports[0].dive.samples_valid > 100);
 }
 
-/// The dive goes back and forth, so that sections fail, their verdicts become final, and later passes clear them.
+/// The dive goes back and forth. Sections fail, fails become final, and later passes clear them.
 pub(crate) const LEGS: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.197\n\
     [[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.4\n[[trajectory.legs]]\ndistance_m = 7\nspeed_mps = -0.3\n";
 

@@ -22,7 +22,7 @@ const TRIES: u32 = 30;
 const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"slow\"\nrange_m = 10\nhead_id = 0x12";
 const PING: &str = "plugin = \"ping1d\"\ndevice_id = 7";
 
-/// A vehicle file with these sensors, each given as an address and the keys of its table.
+/// Returns a vehicle file with these sensors. Each sensor is given by the keys of its table and its address.
 fn vehicle_text(sensors: &[(&str, String)]) -> String {
     let mut text =
         include_str!("../../../deploy/vehicles/pipe.toml").split("[[sensors]]").next().unwrap().to_owned();
@@ -42,7 +42,7 @@ fn emulator(keys: &str) -> Emulated {
     vehicle.sensors[0].emulator(&EmulatorSetup { start, head: None, site: Site::default(), polled: false })
 }
 
-/// A device on a line. It runs until this value is dropped.
+/// An emulated device on a port. It runs until this value is dropped.
 struct Device {
     connect: Connect,
     stopping: Arc<AtomicBool>,

@@ -1,6 +1,6 @@
 //! Devices on real ports with faulty lines: unplugged, garbled, stalled, or connected to the wrong device.
 //!
-//! Every frame that a device sent whole is used. After the fault the device is used again without help. The fault is
+//! Every frame that arrives complete is used. After the fault, the device is used again without help. The fault is
 //! reported in words, and no other sensor is disturbed.
 
 use std::os::unix::fs::PermissionsExt as _;
@@ -28,7 +28,7 @@ const OF_A_BUSY_MACHINE: [&str; 3] = [
     "silent: the line is open, but no frame has arrived yet",
 ];
 
-/// Statuses of a sensor without repetitions. They are the same on a busy machine and on an idle one.
+/// Statuses of a sensor, each listed once. The list is the same on a busy machine and on an idle one.
 fn words(said: &[String]) -> String {
     let mut all: Vec<String> = Vec::new();
     for status in said {
@@ -42,7 +42,7 @@ fn words(said: &[String]) -> String {
     all.join("\n")
 }
 
-/// Unplugs a device in the middle of an answer, waits until it is reported missing, plugs it in, and waits until it
+/// Unplugs a device when the next request arrives, waits until it is reported missing, plugs it in, and waits until it
 /// is used again. Does this twice and returns the statuses.
 fn unplugged_and_plugged_in(text: &'static str, end: End, name: &str) -> String {
     let folder = Folder::new();
@@ -141,7 +141,7 @@ fn device_plugged_in_later_is_used() {
     "#);
 }
 
-/// An echosounder and a head on lines that are garbled at first and sound later, beside a sensor that must not be
+/// Runs an echosounder and a head on lines that are garbled at first and sound later. A third sensor must not be
 /// disturbed.
 fn garbled(change: fn(&mut Random, &[u8]) -> Vec<u8>) {
     let folder = Folder::new();
@@ -177,7 +177,7 @@ fn lost_bytes_lose_only_their_own_frames() {
     garbled(thinned);
 }
 
-/// Garbage between frames. It contains frame headers that promise more bytes.
+/// Inserts garbage between frames. The garbage ends with the header of a longer frame, whose bytes never come.
 fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
     let mut random = Random(seed);
     EachFrame(move |_, frame: &[u8], line: &mut Wire| {
@@ -194,7 +194,7 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 #[test]
 fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // The headers in the garbage promise a profile of 1200 strengths and a return of 500 points.
+    // The headers in the garbage announce a profile of 1200 strengths and a return of 500 points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),
@@ -213,8 +213,7 @@ fn bursts_of_garbage_lose_no_frame() {
     ended.untroubled(2);
 }
 
-/// Stalls in the middle of every third frame. The stall is shorter than the usual pause, longer than it, or lasts for
-/// ever.
+/// Stalls in the middle of every third frame. The stall is shorter than the usual pause, is longer, or lasts for ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);
@@ -410,7 +409,8 @@ impl Fault for DeafAtFirst {
     }
 }
 
-/// Each device waits for an answer that doesn't arrive, and sends nothing while the other device waits.
+/// The drivers of both devices share the line. While one of them waits for an answer that never arrives, the other one
+/// sends nothing.
 #[test]
 fn two_devices_on_one_line_start_although_first_answers_are_lost() {
     let end = End::tcp();

@@ -41,7 +41,7 @@ fn report(folder: &Folder) -> Value {
     serde_json::from_slice(&folder.read("report.json")).unwrap()
 }
 
-/// A dive on a local port with a device and a foreign sender.
+/// Runs a dive on a local port with a device and a foreign sender.
 ///
 /// The first frames come from another system. The device sends after the host has sent to it. Returns the report and
 /// the number of recorded pressures.
@@ -92,7 +92,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
         ended.store(true, Ordering::Relaxed);
         dived
     });
-    // A depth sensor alone can't give a position.
+    // A dive with only a depth sensor has no position, so it exits with 1.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     assert!(answer.stdout.contains("on the line of depth came from other devices"), "{}", answer.stdout);
     let log = folder.read("dive.mcap");

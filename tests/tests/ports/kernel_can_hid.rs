@@ -82,12 +82,12 @@ fn frame_carries_the_kernel_receive_time() {
     let (sender, stamped, plain) = (vcan.socket(), vcan.socket(), vcan.socket());
     stamped.set_recv_timestamp(true).unwrap();
 
-    // Whether the timestamp of a frame precedes its reading. The kernel begins to stamp frames a moment after this is
-    // enabled, and earlier frames get the time of reading.
+    // Whether a frame's timestamp is earlier than the time of reading it. The kernel begins to stamp frames only a
+    // moment after stamping is enabled. Until then, frames get the time of reading.
     let stamped_early = |number| {
         let before = SystemTime::now();
         sender.write_frame(&frame(number)).unwrap();
-        // If one socket has received the frame, the kernel has also received it for the other socket.
+        // Once one socket has received the frame, the kernel has also received it for the other socket.
         assert_eq!(plain.read_frame().unwrap().data(), [number, 2, 3]);
         let received_by = SystemTime::now();
         thread::sleep(Duration::from_millis(5));
@@ -105,7 +105,7 @@ fn frame_carries_the_kernel_receive_time() {
 
 #[test]
 #[ignore = "needs a kernel with vcan: tests/vm/run"]
-fn can_reader_gets_one_error_at_down_and_frames_after_up() {
+fn can_reader_gets_one_error_on_interface_down_and_frames_after_up() {
     let vcan = Interface::up("vcan6");
     let (sender, reader) = (vcan.socket(), vcan.socket());
 

@@ -1,7 +1,7 @@
 //! The CAN and HID drivers on a real kernel, with emulated devices.
 //!
-//! All sent data is decoded. Interfaces and counters may disappear. They are used again when they return, while the
-//! other sensor goes on. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run
+//! All sent data is decoded. If an interface or counter disappears, the other sensor goes on. A returning interface or
+//! counter is used again. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run
 //! --with target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
 
 use std::cell::{Cell, RefCell};
@@ -333,7 +333,8 @@ fn late_read_does_not_change_a_frame_timestamp() {
         sent.since(begun).as_secs_f64() * 1e3
     );
     assert_eq!(all.len(), BURST);
-    // The tolerance is needed because two clocks are compared, and are read at different moments.
+    // The tolerance is needed because the stamps come from another clock, and the two clocks can't be read at the same
+    // moment.
     let slack = DurNs::from_millis(2);
     for (number, (stamp, read)) in all.iter().enumerate() {
         assert!(
@@ -364,7 +365,7 @@ fn can_interface_down_and_up_is_read_again_from_the_first_frame() {
             Phase::Closed,
             "opening vcan3: the interface is down; sudo ip link set vcan3 up",
         );
-        // Meanwhile messages of the unit are lost. The second outage is longer than the silence timeout.
+        // During the outage, messages of the unit are lost. The second outage is longer than the silence timeout.
         rehearsal.send(IMU, &mut imu, 3);
         rehearsal.exactly(TETHER, &mut tether, 60);
         if round == 1 {

@@ -1,5 +1,5 @@
-//! A rehearsal: `emulate` and `run` in two processes, connected by pseudoterminals, TCP and UDP. The dive is compared
-//! with the replay of its scene.
+//! A rehearsal: `emulate` and `run` in two processes, connected by pseudoterminals, TCP and UDP. The live dive is
+//! compared with a simulation of the same scene.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
@@ -130,7 +130,7 @@ const APART_M: f64 = 0.12;
 const TARGET_M: f64 = 0.7;
 const CONFIDENCE_SD: f64 = 2.0;
 
-/// Whether the margin of a passed section is less than [`APART_M`].
+/// Whether a section passes with a margin below [`APART_M`].
 fn is_near(section: &Value) -> bool {
     let of = |key: &str| section[key].as_f64().unwrap_or(f64::NAN);
     section["verdict"] == "pass" && TARGET_M - of("hole_m") - CONFIDENCE_SD * of("hole_sd_m") < APART_M
@@ -152,8 +152,8 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
             continue;
         };
         let hole_m = |section: &Value| section["hole_m"].as_f64().unwrap_or(f64::NAN);
-        // Different phases between the heads change a hole by some millimetres at most. But if the machine stalls for
-        // a quarter of a second, the hole truly becomes larger.
+        // In the two dives, the heads have slightly different phases, which changes a hole by some millimetres at most.
+        // But if the machine stalls for a quarter of a second, the hole truly becomes larger.
         let apart_m = (hole_m(ours) - hole_m(theirs)).abs();
         if apart_m > APART_M {
             different.push(format!("{start} m: holes are {apart_m:.3} m apart"));

@@ -12,12 +12,12 @@ use super::rehearsal::{Running, headrace, interrupt, report, scene};
 
 /// Default length of a soak, minutes.
 const MINUTES: f64 = 10.0;
-/// Interval between two samples; faults have the same interval.
+/// Interval between two samples of the resources.
 const LOOK: Duration = Duration::from_secs(5);
 const LOOKS_A_FAULT: usize = 7;
 /// Duration of a freeze.
 const FREEZE: Duration = Duration::from_millis(1_500);
-/// Number of samples at the start that don't count for files and threads.
+/// Number of samples at the start that are left out of the checks of files and threads.
 const WARM_UP: usize = 12;
 
 /// Resources of a process.

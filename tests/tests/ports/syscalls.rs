@@ -39,8 +39,8 @@ fn calls(trace: &str) -> (Vec<&str>, usize) {
             within = None;
             parts += 1;
         } else if within == Some(thread)
-            // Lines with signals don't count, nor do the ends of interrupted calls. One of these may belong to a
-            // mark.
+            // Lines with signals don't count. The end of an interrupted call doesn't count either, because the call may
+            // be a mark.
             && !call.starts_with("---")
             && !call.starts_with("<... ")
         {

@@ -1,4 +1,4 @@
-//! A factored covariance after random steps. It stays a valid covariance, and each measurement follows the scalar
+//! Random steps on a factored covariance. It stays a valid covariance, and each measurement changes it by the scalar
 //! formula.
 
 use headrace_fusion::filter::factors::Factors;
@@ -7,8 +7,8 @@ use headrace_geometry::math;
 use crate::{Case, few, many};
 
 const N: usize = 6;
-/// Relative tolerance. Dependent variances of 1e-10 and 1e+10 have factors with a ratio of 1e10. In two million
-/// cases, four errors were over 1e-9, and the largest was 3e-8.
+/// Relative tolerance. Correlated errors with variances of 1e-10 and 1e+10 give factors with a ratio of 1e10. In two
+/// million cases, four errors were over 1e-9, and the largest was 3e-8.
 const SHARE: f64 = 1e-6;
 
 fn row(case: &mut Case) -> [f64; N] {

@@ -58,7 +58,7 @@ fn hole(case: &mut Case) -> Result<(), String> {
     if !numbers.iter().all(|number| number.is_finite()) {
         return Err(format!("{hole:?}"));
     }
-    // Far chainages round the positions of samples, so the oracle gets the rounded samples.
+    // At a large chainage, positions of samples are rounded, so the oracle gets the rounded positions.
     let wall = Wall::new(samples.iter().map(|[x_m, arc_m]| [(x_m + along_m) - along_m, *arc_m]), perimeter_m)
         .map_err(|why| why.to_string())?;
     let ends = [(from_m + along_m) - along_m, (to_m + along_m) - along_m];

@@ -1,5 +1,5 @@
-//! The paper's equations for random arguments. The result is a finite number that the inverse equation confirms, or a
-//! named error.
+//! The paper's equations with random arguments. Each result is a named error, or a finite number that the inverse
+//! equation confirms.
 
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
 use headrace_sampling::head::Turn;
@@ -9,7 +9,7 @@ use headrace_sampling::spacing::{self, Spiral};
 
 use crate::{Case, few, many, within};
 
-/// A random number. It is rarely a sensible argument.
+/// A random argument. It is often zero, negative, extreme, infinite or not a number.
 fn any(case: &mut Case) -> f64 {
     match case.below(12) {
         0 => 0.0,
@@ -97,7 +97,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("{steps} steps: {} and {}", spiral.pitch_m(), spiral.advance_m()));
     }
 
-    // A start angle lies within the turn. The inverse computation, for the other end of the hull, gives the phase
+    // A start angle lies within one turn. The inverse computation, with the opposite turning rate, gives the phase
     // again.
     let (phase, rate) = (case.between(0.0, TAU), case.between(0.1, 3.0));
     let (x, v) = (case.between(-2.0, 2.0), case.power_of_ten(-9.0, 1.0));

@@ -1,7 +1,7 @@
 //! The advice is right: simulated vehicles that follow it meet the target, and those that are a tenth faster miss it.
 //!
-//! Heads that are apart along the hull start in phase for the speed that the advice gives for their mode. They keep
-//! turning in the same way when the pilot drives at another speed.
+//! Heads that are apart along the hull start in phase for the advised speed of their mode. They keep their turn times
+//! and start phases when the pilot drives at another speed.
 
 use headrace_coverage::Verdict;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ const TICK: DurNs = DurNs(20_000_000);
 /// Chainage at which dives begin, and length of the judged part, m.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
-/// If the median hole exceeds this fraction of the predicted T, a speed increase by a tenth must make sections fail.
+/// Cases whose median hole exceeds this fraction of the predicted T must fail sections at a tenth more speed.
 const NEAR: f64 = 0.95;
 /// Number of updates in which a vehicle comes to a stop.
 const BRAKING: usize = 15;
@@ -85,7 +85,8 @@ const SWINGING: [Case; 6] = [
 ];
 
 impl Case {
-    /// Length at either end of the dive in which sections aren't judged, m, because not all heads have passed there.
+    /// Length of the stretch at either end of the dive where the test ignores sections, m. Not all heads have been
+    /// there.
     fn ends_m(&self) -> f64 {
         1.2 * self.target_m + 1.0 + 8.0 * self.yaw_deg.to_radians()
     }
@@ -233,7 +234,8 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
                 ));
             }
         }
-        // If fewer sections fail, their holes are smaller than predicted. No hole may be larger than predicted.
+        // In other cases, holes are smaller than predicted, and fewer sections fail. No hole may be larger than
+        // predicted.
         if at.holes[1].max(above.holes[1]) > 1.0 {
             broken.push(format!("{}: holes of {:?} and {:?} of T", case.what, at.holes, above.holes));
         }
@@ -243,8 +245,8 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
-/// Sections are missed at a speed a third above the advice. The speed for repeating them must be near the advice,
-/// because both numbers are on one screen.
+/// The vehicle misses sections because it is a third faster than advised. The speed for repeating them must be near the
+/// advised speed, because one screen shows both.
 #[test]
 fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
@@ -303,8 +305,8 @@ fn advice_compensates_lost_returns() {
     let mut broken = Vec::new();
     for case in &LOSSY {
         let sound_mps = Case { effects: "", ..*case }.planned_mps();
-        // The loop knows the losses only some turns after they began. The vehicle is slow, so that it hasn't moved
-        // far by then.
+        // The loop detects the losses only some turns after they began. This vehicle is slow, so it hasn't moved far by
+        // then.
         let v_max_mps = case.dive(sound_mps, 0.5 * sound_mps).median(v_max_mps);
         let dives = [v_max_mps, sound_mps].map(|speed_mps| case.dive(sound_mps, speed_mps));
         let [at, as_before] = [0, 1].map(|k| Judged::of(case, &dives[k]));
@@ -327,7 +329,7 @@ fn advice_compensates_lost_returns() {
                 case.what, as_before.passing
             ));
         }
-        // The speed for repeating sections must be near the present limit, because both are on one screen.
+        // The speed for repeating sections must be near the present limit, because one screen shows both.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
             broken.push(format!(
                 "{}: the repeat speed is {again:.4} m/s, but {v_max_mps:.4} is advised",
@@ -365,7 +367,7 @@ fn advice_states_that_a_lower_speed_does_not_help() {
 }
 
 #[test]
-fn filter_uncertainty_lowers_the_advice_by_its_margin_only() {
+fn filter_lowers_the_advised_speed_only_by_its_position_margin() {
     for case in [Case { mode: "slow", target_m: 5.0, ..VITA1 }, TWO, Case { target_m: 0.9, ..FOUR }] {
         let direct_mps = case.dive(0.15, 0.15).median(v_max_mps);
         let filtered = Case { filter: true, ..case }.dive(0.15, 0.15);
@@ -386,7 +388,7 @@ fn a_minute(beats: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry) 
 #[test]
 fn advice_in_the_field_changes_slowly_enough_to_read() {
     let text = include_str!("../../../deploy/scenes/vita1-field.toml").replace("../vehicles/", "");
-    // At this speed the target is met half of the time.
+    // At this speed, about half of the updates meet the target.
     let shorter = text.replace("distance_m = 130\nspeed_mps = 0.16", "distance_m = 50\nspeed_mps = 0.197");
     assert_ne!(text, shorter);
     let scene = scenes::scene(&shorter);

@@ -1,4 +1,4 @@
-//! The table of ideal scenes, from scene to bytes to log to report.
+//! The table of ideal scenes. The tests cover all steps from scene to bytes, log and report.
 //!
 //! It covers the modes SLOW to FASTEST with 1, 2 and 4 phase-shifted heads at 0.197 m/s. All heads are at the centre
 //! of the circle in the `ceran` profile. The mean distance between passes must be v T / s within 0.5 %. The largest

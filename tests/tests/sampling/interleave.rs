@@ -1,7 +1,7 @@
 //! Interleaving of several heads by the paper's §5. The tests step the heads ping by ping along a straight tunnel.
 //!
-//! They collect the chainages at which each head looks at an angle. The positions come from each head's program
-//! alone, so no layout formula is tested with another one.
+//! They collect the chainages at which each head looks at a given angle. Each head is stepped by its own program. So
+//! the layout formulas aren't tested with other layout formulas.
 
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::math::{PI, TAU, floor_to_i64};
@@ -21,7 +21,7 @@ const SAME_RAD: f64 = 1e-9;
 const SAME_M: f64 = 1e-7;
 /// Number of pings in a turn, divisible by 2 to 6 sectors.
 const STEPS: u32 = 120;
-/// Directions of the heads: all forward, alternating, the first forward and all others aft, and all aft.
+/// Directions of the heads: all forward; forward and aft in turn; the first forward and all others aft; all aft.
 const FACINGS: [fn(usize) -> bool; 4] = [|_| false, |k| k % 2 == 1, |k| k > 0, |_| true];
 
 const SPEEDS_MPS: [f64; 3] = [0.1, 0.197, 0.8];
@@ -64,7 +64,8 @@ impl Rig {
         self.hull_m.iter().zip(&self.aft).map(spec).collect()
     }
 
-    /// A dive at `speed_mps` with heads laid out for `planned_mps`. It is some turns longer than the hull.
+    /// Simulates a dive at `speed_mps` with heads laid out for `planned_mps`. The dive is longer than the hull by some
+    /// turns.
     fn dive(&self, layout: HeadLayout, planned_mps: f64, speed_mps: f64) -> Dive {
         let [back_m, front_m] = ends(&self.hull_m);
         let ping_m = speed_mps * self.ping_s();
@@ -124,7 +125,7 @@ struct Track {
 }
 
 impl Track {
-    /// Chainages at which the head looks at a body angle. A turning point at this angle counts once.
+    /// Chainages at which the head looks at a body angle. If the head turns back at this angle, it counts once.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let off: Vec<f64> = self.body.iter().map(|body| wrapped(body - angle)).collect();
         let mut found = Vec::new();
@@ -162,7 +163,7 @@ impl Dive {
         all
     }
 
-    /// Checks that the passes over an angle are `apart_m` apart from one end to the other.
+    /// Checks that all passes over an angle are evenly spaced, `apart_m` apart.
     fn assert_even(&self, angle: f64, apart_m: f64) {
         let (all, [first, last]) = (self.passes(angle), self.shared_m);
         assert!(all.len() > 3 && all[0] - first < apart_m + SAME_M, "{all:?} from {first}");
@@ -184,8 +185,8 @@ impl Dive {
         }
     }
 
-    /// Checks that only head `k` passes the angles of its own sector, and that it does so at two alternating
-    /// distances.
+    /// Checks that only head `k` passes the angles of its sector, and that the distances between its passes alternate
+    /// between two values.
     fn assert_two_distances(&self, k: usize, pitch_m: f64) {
         let heads = self.tracks.len();
         for share in [0.0, 0.03, 0.25, 0.4, 0.5, 0.75, 0.9, 1.0] {
@@ -245,7 +246,7 @@ fn phase_shifted_heads_pass_each_angle_at_equal_distances() {
 }
 
 #[test]
-fn heads_in_sectors_sweep_in_phase_at_two_alternating_distances() {
+fn heads_in_sectors_sweep_in_phase_with_alternating_pass_distances() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;
@@ -259,7 +260,7 @@ fn heads_in_sectors_sweep_in_phase_at_two_alternating_distances() {
             dive.assert_in_step(1e-7);
             for k in 0..heads {
                 dive.assert_two_distances(k, pitch_m);
-                // At the border of two sectors, both heads turn round, half a sweep apart.
+                // At the border of two sectors, both heads turn back. They do so at evenly spaced chainages.
                 dive.assert_even(TAU * (k + 1) as f64 / heads as f64, pitch_m / heads as f64);
             }
             // With other distances, a head may reach the end of its sector up to one ping early or late.
@@ -271,10 +272,10 @@ fn heads_in_sectors_sweep_in_phase_at_two_alternating_distances() {
     }
 }
 
-/// The cases are steps of 2.4 degrees in quarters of a turn, and steps of 0.9 degrees in thirds. The shorter last
-/// step makes the sweep longer than 2 T / s.
+/// The cases are steps of 2.4 degrees in sectors of 90 degrees, and steps of 0.9 degrees in sectors of 120 degrees. The
+/// last step of a sector is shorter, and makes the sweep longer than 2 T / s.
 #[test]
-fn sectors_not_divisible_by_the_step_are_in_phase_within_two_pings() {
+fn heads_in_sectors_not_divisible_by_the_step_are_in_phase_within_two_pings() {
     for (steps, heads, turn_s) in [(150, 4, 4.8), (400, 3, 8.0)] {
         let rig = Rig { steps, ..Rig::new(&hulls(heads)[2], |_| false, turn_s) };
         rig.dive(SectorOffset, 0.1, 0.1).assert_in_step(2.0 * rig.step_rad());
@@ -317,7 +318,7 @@ fn gaps_of_a_faster_vehicle_differ_by_the_phase_errors() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for hull_m in &hulls(heads)[1..] {
             let dive = Rig::new(hull_m, facing, turn_s).dive(PhaseShift, planned_mps, speed_mps);
-            // Delay of a head at a place in addition to its phase, turns: x / (v T) - x / (v' T).
+            // Delay of a head at place x, in addition to its planned phase, turns: x / (v T) - x / (v' T).
             let late = |x_m: f64| (ends(hull_m)[1] - x_m) * (1.0 / planned_mps - 1.0 / speed_mps) / turn_s;
             let first: Vec<f64> = dive.tracks.iter().map(|track| track.passes(1.0)[0]).collect();
             for k in 1..heads {
@@ -385,8 +386,8 @@ fn sector_of_12_5_steps_ends_with_a_half_step_and_pings_each_end_once() {
     let out = (0..13).map(|n| 7.2 * f64::from(n));
     let sweep: Vec<f64> = out.clone().chain(out.map(|degrees| 90.0 - degrees)).collect();
     for (n, degrees) in (0..1000).zip(sweep.iter().cycle()) {
-        // A ping's angle must hold from its exact nanosecond to a microsecond before the next ping, although 0.3 /
-        // 0.1 is rounded to below 3.
+        // A head must keep a ping's angle from the ping's exact nanosecond until a microsecond before the next ping.
+        // Rounding must not change this: 0.3 / 0.1 is below 3.
         for ns in [100_000_000 * n, 100_000_000 * n + 99_999_000] {
             let got = schedule.angle_rad(0, DurNs(ns)).unwrap().to_degrees();
             assert!((got - degrees).abs() < 1e-6, "{got} for {degrees} at {ns} ns");
@@ -427,7 +428,7 @@ fn impossible_layout_is_a_named_error() {
 }
 
 #[test]
-fn step_not_above_zero_is_a_named_error_in_either_layout() {
+fn step_of_zero_or_less_is_a_named_error_in_both_layouts() {
     for (layout, step_rad) in [PhaseShift, SectorOffset].into_iter().flat_map(|l| [(l, 0.0), (l, -0.1)]) {
         let head = HeadSpec { step_rad, ..Rig::new(&[0.0], |_| false, 8.0).specs()[0] };
         assert!(programs(&[head; 2], layout, 0.2).is_err(), "{layout:?} in steps of {step_rad}");

@@ -2,8 +2,8 @@
 //! (`oracles/sampling.csv`).
 //!
 //! The inputs are doubles and count as exact. So the tolerance only covers rounding in the computation. It is some
-//! units in the last place, times the condition number if the rounding of an intermediate value matters like that of
-//! an input.
+//! units in the last place. It is multiplied by the condition number if the computation magnifies the rounding of an
+//! intermediate value.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
@@ -59,14 +59,14 @@ impl Row {
         (got - self.value).abs() / self.value.abs().max(f64::MIN_POSITIVE)
     }
 
-    /// Checks a place `got` on a circle of this circumference.
+    /// Checks a position `got` on a circle of circumference `modulus`.
     fn around(&self, got: f64, modulus: f64, tolerance: f64) {
         let off = math::wrap_signed(got - self.value, modulus);
         self.near(self.value + off, tolerance);
     }
 }
 
-/// Rows of the cases with these names, which must exist.
+/// Rows of the cases with these names. All of them must exist.
 fn rows(cases: &[&str]) -> Vec<Row> {
     let mut found = Vec::new();
     for (number, line) in ROWS.lines().enumerate() {
@@ -94,7 +94,7 @@ fn condition(angle_rad: f64) -> f64 {
     1.0 + angle_rad / (FRAC_PI_2 - angle_rad).abs()
 }
 
-/// Near 90 degrees the tangent is unbounded, so the difference of two tangents would lose all digits.
+/// Near 90 degrees, tangents are very large, so a formula that subtracts two tangents would lose all digits.
 #[test]
 fn steps_near_90_degrees_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
@@ -105,7 +105,7 @@ fn steps_near_90_degrees_match_the_oracle() {
     found_at("sampling.corner", magnified, worst, 8.0 * ULP);
 }
 
-/// If T_y is close to the target, the difference of their squares would lose digits by cancellation.
+/// If T_y is close to the target, a formula that subtracts their squares would lose digits.
 #[test]
 fn speeds_near_the_limit_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
@@ -119,7 +119,7 @@ fn speeds_near_the_limit_match_the_oracle() {
     found_at("sampling.speed", magnified, worst, 8.0 * ULP);
 }
 
-/// At a crawl, a head makes very many turns before the vehicle reaches the former position of another head.
+/// At a crawl, a head makes very many turns until the vehicle has brought it to the place of another head.
 #[test]
 fn phases_at_a_crawl_match_the_oracle() {
     let (mut worst_rad, mut turned_most) = (0.0_f64, 0.0_f64);
@@ -188,7 +188,7 @@ fn forward_motion_matches_the_oracle() {
 }
 
 #[test]
-fn phases_of_heads_apart_match_the_oracle() {
+fn phases_of_heads_apart_along_the_hull_match_the_oracle() {
     for row in rows(&["eq20", "eq21"]) {
         let [phase, rate, x, v] = [1, 2, 3, 4].map(|i| row.i(i));
         let start = if row.case == "eq20" { start_rad } else { start_reversed_rad };

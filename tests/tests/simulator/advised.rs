@@ -1,5 +1,5 @@
-//! A simulated pilot who gets advice. The pilot hurries, is shown a missed stretch, goes back, and leaves no missed
-//! section.
+//! A simulated pilot who gets advice. The pilot drives too fast, sees the missed stretch, goes back, and leaves no
+//! missed section.
 
 use headrace_coverage::Verdict;
 use headrace_simulator::{Message, Scene, Simulation};

@@ -24,7 +24,7 @@ fn folder(keys: &str) -> Folder {
     folder
 }
 
-/// Values of one column of the ground truth, from rows with `value` in the column `key`.
+/// Values of the column `wanted` in the ground truth, from rows with `value` in the column `key`.
 fn column(truth: &str, (key, value): (&str, &str), wanted: &str) -> Vec<String> {
     let mut rows = truth.lines().skip_while(|line| line.starts_with('#'));
     let columns: Vec<&str> = rows.next().unwrap().split(',').collect();
