@@ -87,8 +87,11 @@ pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
             .filter(|point| point.scene == scene && point.error() <= default.error() + trade.resolution())
             .min_by(|a, b| a.cost.middle.total_cmp(&b.cost.middle));
         if let Some(better) = better {
+            let method = &better.method;
+            let is_named = *method == default.method || *method == better.knob;
+            let method = if is_named { String::new() } else { format!("{method}, ") };
             lines.push(format!(
-                "Cheaper with no more error ({scene}): {} instead of the shipped {}.",
+                "Cheaper with no more error in \"{scene}\": {method}{}. Shipped: {}.",
                 whole(trade, better),
                 whole(trade, default)
             ));

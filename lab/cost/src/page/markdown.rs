@@ -53,17 +53,17 @@ pub(super) fn method(results: &Results) -> String {
         append(
             &mut text,
             format_args!(
-                "\n## {}\nError of the independent values themselves: {}; {}.\n",
+                "\n## {}\nThe independent values have an error of {}. Evidence: {}.\n",
                 trade.title,
                 number(trade.oracle.size),
                 trade.oracle.how
             ),
         );
         if !trade.left_out.is_empty() {
-            text.push_str("\nLeft out:\n");
+            text.push_str("\nNot measured:\n");
         }
         for left in &trade.left_out {
-            append(&mut text, format_args!("- {}: {}\n", left.what, left.why));
+            append(&mut text, format_args!("- **{}**: {}\n", left.what, left.why));
         }
     }
     text
