@@ -15,11 +15,11 @@ pub const ADVICE_PERIOD: DurNs = DurNs(200_000_000);
 pub struct AdviceEntry {
     /// Time of the entry, in data time.
     pub at: MonoNs,
-    /// Chainage at that time, m; `None` without a fix.
+    /// Chainage of the vehicle at the entry's time, m; `None` without a fix.
     pub chainage_m: Option<f64>,
-    /// Speed at that time, m/s.
+    /// Speed of the vehicle at the entry's time, m/s.
     pub speed_mps: f64,
-    /// The advice.
+    /// Speed advice shown at the entry's time.
     pub advice: Advice,
 }
 
@@ -32,9 +32,9 @@ pub struct AdviceEntry {
 pub struct AdviceLog {
     /// The entries, in order.
     pub entries: Vec<AdviceEntry>,
-    /// Entries dropped for lack of room.
+    /// Number of advice entries dropped for lack of room.
     pub dropped: u64,
-    /// Minimum time between two entries.
+    /// Minimum time between two entries of the advice history.
     apart: DurNs,
 }
 

@@ -29,11 +29,11 @@ const SLOWEST_MPS: f64 = 0.05;
 /// Part of the loop that computes the advice.
 pub struct Adviser {
     part: Part<AdviseStage>,
-    /// An empty tick. The world holds it between ticks.
+    /// Empty tick for the placer's values. The adviser keeps it as a placeholder between ticks.
     nothing: Arc<Placed>,
 }
 
-/// Advice of a tick.
+/// Advice computed in one tick.
 ///
 /// The list is reused from tick to tick. In a default value the list grows as needed.
 #[derive(Debug, Default)]
@@ -44,7 +44,7 @@ pub struct Advised {
 }
 
 impl Advised {
-    /// Returns an empty tick that follows this one.
+    /// Returns the advice of an empty tick that follows this tick.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut stream = self.stream.clone();
         stream.next_tick();
@@ -195,7 +195,7 @@ impl Advisor {
     }
 }
 
-/// Rotation of the vehicle between two passes.
+/// Rotation of the vehicle between two passes of heads over the same wall.
 fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
     if let Some(pose) = situation.pose {
         looks.keep(at, pose.attitude * Vec3::new(1.0, 0.0, 0.0));
@@ -242,7 +242,7 @@ mod tests {
         MonoNs(0) + DurNs::from_secs_f64(seconds)
     }
 
-    /// Two heads that turn in 8 s. Along the hull they are this far apart, m.
+    /// Situation of two heads that turn in 8 s and are mounted `apart_m` metres apart along the hull.
     fn two_heads(apart_m: f64) -> Situation {
         let mut situation = Situation { configured: 2, ..situation(Some(5.0)) };
         for (number, slot) in situation.heads.iter_mut().take(2).enumerate() {
@@ -321,8 +321,8 @@ mod tests {
         }
         let side_by_side = swung(0.0, 0.1);
         assert!(near(side_by_side.rate_radps, 0.01) && side_by_side.apart_rate_radps.abs() <= 0.0);
-        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the heads are 16 s apart. Only the last
-        // half minute counts.
+        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the second head arrives 16 s after the
+        // first. Only the rotation of the last 30 s counts.
         let at_rest = swung(0.8, 0.0);
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }

@@ -19,9 +19,9 @@ use headrace_sampling::head::HeadSet;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Largest share of the target that position errors may take. Above it, the position is doubtful.
+/// Largest share of the target that position errors may use up. Above it, the position is doubtful.
 const SPREAD_SHARE: f64 = 0.2;
-/// Room for notices, per alert in the list. An alert may change several times in a tick.
+/// Maximum notices per alert in the list and tick. An alert may change several times in a tick.
 const NOTICES_PER_ALERT: usize = 4;
 
 /// Alerts, notes and the live state.
@@ -29,13 +29,13 @@ pub struct Alerter {
     pub(super) list: AlertList,
     pub(super) notes: Notes,
     pub(super) state: LiveState,
-    /// Number of commands without effect.
+    /// Number of operator commands without effect.
     pub(super) without_effect: u64,
-    /// Live states at the updates.
+    /// Result stream of the live states at the advice updates.
     pub(super) states: ResultStream,
-    /// Changes of alerts, and notes.
+    /// Result stream of alert changes and notes.
     pub(super) changes: ResultStream,
-    /// Changes of alerts, and notes, of the last tick, in order.
+    /// Alert changes and notes of the last tick, in order.
     pub(super) notices: Vec<Notice>,
     /// Sources of the heads, by number.
     heads: Vec<SourceId>,
@@ -201,36 +201,36 @@ fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &
     }
 }
 
-/// Inputs of a tick, and how many of them have been applied.
+/// Inputs of a tick, and how many of them have been applied so far.
 struct Inputs<'a> {
     runs: &'a [RunInput],
     commands: &'a [ReceivedCommand],
     events: &'a [Event],
-    /// Numbers of runs, commands and events applied so far.
+    /// Number of runs, commands and events applied so far.
     taken: (usize, usize, usize),
 }
 
 impl Alerter {
-    /// Applies everything that was consumed before an update. `event` is the index of the first event after
-    /// the update.
+    /// Applies everything that was consumed before an advice update. `event` is the index of the first event
+    /// after the update.
     fn take_before(&mut self, event: usize, inputs: &mut Inputs<'_>) {
         self.take_until(Some(event), inputs);
         self.hear(inputs, event);
     }
 
-    /// Applies an update. Everything before it must have been applied.
+    /// Applies an advice update. All inputs before it must have been applied already.
     fn take_beat(&mut self, beat: &Beat<'_>) {
         let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
         self.list.beat(beat, &mut to);
     }
 
-    /// Applies the rest of the tick.
+    /// Applies the inputs that remain in the tick.
     fn take_rest(&mut self, inputs: &mut Inputs<'_>) {
         self.take_until(None, inputs);
         self.hear(inputs, inputs.events.len());
     }
 
-    /// Applies a changed run.
+    /// Applies a changed run of flagged sections.
     fn take_run(&mut self, run: &RunInput) {
         let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
         self.list.take_run(run, &mut to);
@@ -246,7 +246,7 @@ impl Alerter {
         inputs.taken.2 = until.max(inputs.taken.2);
     }
 
-    /// Applies runs and commands up to an update, or all of them.
+    /// Applies changed runs and commands up to an advice update, or all of them.
     ///
     /// A command comes before the results of the event that follows it.
     fn take_until(&mut self, beat: Option<usize>, inputs: &mut Inputs<'_>) {

@@ -128,7 +128,7 @@ fn spawn_vehicle(
     heads
 }
 
-/// Spawns the heads in the surveyor, with the placer's constants.
+/// Spawns the heads in the surveyor's world, with the constants that they have in the placer's world.
 fn copy_heads(placer: &World, heads: &[Entity], surveyor: &mut Part<SurveyStage>) {
     for head in heads {
         let head = placer.entity(*head);
@@ -168,7 +168,7 @@ fn live_state(mission: &Mission, heads: &[SourceId], sources: usize, heads_reach
     LiveState { length_m: mission.length_m, heads_reach_m, ..live }
 }
 
-/// Numbers the heads in the order of sources. Returns each head's specification and modes.
+/// Numbers the heads in the order of sources. Returns each head's specification and scan modes.
 fn number_heads(
     world: &mut World,
     sensors: &[Entity],
@@ -197,7 +197,7 @@ fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<Sour
     place.map(|place| Some(SourceId(place))).ok_or_else(|| PluginError::MissingSource { id: id.clone() })
 }
 
-/// Names of the heads and their alternative settings.
+/// Names of the heads, and the alternative settings that could be advised.
 fn head_descriptions(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> HeadDescriptions {
     let mut heads = world.query::<(&Head, &Mounted, &HeadSpecification)>();
     let mut heads: Vec<_> = heads.iter(world).collect();

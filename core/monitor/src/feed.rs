@@ -1,4 +1,4 @@
-//! Runs an armed loop. Ports, logs and the simulator differ only in their [`Feed`].
+//! Runs an armed loop. Ports, logs and the simulator differ only in their [`Feed`] of packets.
 
 use super::run::Loop;
 use headrace_geometry::time::MonoNs;
@@ -38,7 +38,7 @@ pub fn drive<F: Feed>(
     Ok(())
 }
 
-/// Ticks at least once, until the rings are empty.
+/// Runs ticks, at least one, until the packet rings are empty.
 ///
 /// A lagging outlet makes the loop hold packets back. `pause` then gives the outlet time.
 pub fn work_off(dive: &mut Loop, now: MonoNs, after_tick: &mut dyn FnMut(&Loop), pause: &mut dyn FnMut()) {

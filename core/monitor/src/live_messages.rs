@@ -31,25 +31,25 @@ pub enum LiveMessage {
     /// Sections were missed. If a run continues with another cause, the message is repeated from the first
     /// section with that cause.
     Flag {
-        /// Number of the run.
+        /// Number of the run of flagged sections.
         run: u32,
         /// Beginning of the stretch with this cause, m.
         from_m: f64,
-        /// Main cause.
+        /// Main cause of the miss.
         cause: Cause,
-        /// All causes.
+        /// All causes of the miss.
         causes: Causes,
         /// Figures for the text of the message.
         #[serde(skip)]
         missed: Missed,
     },
-    /// The end of the last flagged run is known.
+    /// The end of the most recently flagged run is known.
     FlagEnds {
-        /// Number of the run.
+        /// Number of the run of flagged sections.
         run: u32,
-        /// Beginning.
+        /// Beginning of the run.
         from_m: f64,
-        /// End.
+        /// End of the run.
         to_m: f64,
         /// Metres of the run that fail.
         failed_m: f64,
@@ -58,9 +58,9 @@ pub enum LiveMessage {
     Cleared {
         /// Number of the run that was flagged.
         run: u32,
-        /// Beginning.
+        /// Beginning of the cleared stretch.
         from_m: f64,
-        /// End.
+        /// End of the cleared stretch.
         to_m: f64,
     },
     /// A stretch without a verdict has begun.
@@ -72,20 +72,20 @@ pub enum LiveMessage {
     NotInspected(UnsureStretch),
     /// An alert has changed.
     AlertChange {
-        /// Kind of change.
+        /// Kind of the alert's change.
         change: AlertChange,
-        /// The alert as it was at that time.
+        /// The alert as it was at the time of the change.
         alert: Box<ListedAlertJson>,
     },
     /// A note was added.
     Note(NoteJson),
     /// Present coverage extent.
     Way {
-        /// Beginning.
+        /// Beginning of the extent.
         from_m: f64,
-        /// End.
+        /// End of the extent.
         to_m: f64,
-        /// Metres by verdict.
+        /// Metres of the extent by verdict.
         metres: LiveMetres,
     },
 }
@@ -95,19 +95,20 @@ pub enum LiveMessage {
 /// A dive has one converter. All readers share its messages.
 #[derive(Debug, Default)]
 pub struct LiveMessages {
-    /// Last flagged run with its reported causes, until its end is reported.
+    /// Most recently flagged run with its reported causes, until its end is reported.
     run: Option<(RunId, Causes)>,
     /// Stretches reported as missed, as long as any of their sections fails.
     missed: Vec<ReportedMiss>,
     /// Last reported unsure stretch, until its end is reported.
     unsure: Option<Stretch>,
-    /// Whether that stretch was reported as one in which the error matters more than the hole.
+    /// Whether the unsure stretch was reported as one in which the error matters more than the hole.
     told_as_error: bool,
-    /// Stretches whose ends were reported.
+    /// Unsure stretches whose ends were reported.
     told: Vec<Stretch>,
-    /// Sections at an end of the coverage extent, kept until the vehicle is well away from them.
+    /// Sections at an end of the coverage extent. Their message is held back until the vehicle is well away
+    /// from them.
     at_ends: Option<Stretch>,
-    /// Last reported doubtful setting, and the number of its alert.
+    /// Number of the alert for the last reported doubtful setting, and that setting.
     setting: Option<(u32, SettingDoubt)>,
     way_told: Option<MonoNs>,
     /// End of the last tick whose messages were reported.
@@ -129,8 +130,8 @@ impl ReportedMiss {
 }
 
 impl LiveMessages {
-    /// Resets all state after a jump of the playback: it has stopped at another time than that of the last
-    /// tick.
+    /// Resets all state after a jump of the playback, which is recognised by a time other than the end of the
+    /// last tick.
     ///
     /// After a mere pause, the messages continue.
     pub fn stopped(&mut self, now: MonoNs) {
@@ -139,7 +140,7 @@ impl LiveMessages {
         }
     }
 
-    /// Processes a notice, and calls `tell` with the messages that follow from it.
+    /// Processes a notice, and calls `tell` with the messages that result.
     pub fn hear(&mut self, notice: &Notice, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         match notice {
             Notice::Advice(_) => {}
@@ -159,7 +160,7 @@ impl LiveMessages {
         }
     }
 
-    /// Reports whatever the live state requires, after every tick.
+    /// Reports any messages that the live state requires, after every tick.
     pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         self.played = Some(dive.now());
         let Some(at) = state.at else { return };
@@ -173,7 +174,7 @@ impl LiveMessages {
             let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
             tell(LiveMessage::Way { from_m, to_m, metres: state.metres });
         }
-        // Diameter of a circle with the same perimeter.
+        // Diameter of the circle whose perimeter equals the tunnel's.
         let width_m = 2.0 * dive.mission().profile.perimeter_m() / TAU;
         if let (Some(ends), Some(x_m)) = (self.at_ends, state.chainage_m) {
             let off_m = (sections.bounds_m(ends.from).0 - x_m).max(x_m - sections.bounds_m(ends.to).0);
@@ -206,7 +207,7 @@ impl LiveMessages {
 
     fn tell_ends(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(ends) = self.at_ends.take() else { return };
-        // Some sections may have been inspected since.
+        // Some of the sections at an end may have been inspected in the meantime.
         let still = (ends.from..ends.to).filter_map(|index| sections.unsure(index));
         let mut still = still.filter(|here| here.why == Unsure::NotInspected);
         let Some(mut all) = still.next() else { return };
@@ -221,7 +222,8 @@ impl LiveMessages {
 
     fn note_unsure(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let section_m = sections.section_m();
-        // A section at an end of the coverage extent is reported later, if it is still unsure then.
+        // A section at an end of the coverage extent is reported later, if it is still without a verdict
+        // then.
         let is_settled = sections.get(section).is_some_and(|section| section.settled);
         let lasts = |here: &Stretch| is_settled || here.why == Unsure::NotInspected;
         let Some(here) = sections.unsure(section).filter(lasts) else {
@@ -250,7 +252,7 @@ impl LiveMessages {
         if let Some(last) = &mut self.unsure
             && (is_told(last) || last.join(&here, section_m))
         {
-            // The first sections of a stretch may have a different reason than most of its sections.
+            // The first sections of an unsure stretch may have a different reason than most of its sections.
             if self.told_as_error && !last.is_mostly_error() {
                 self.told_as_error = false;
                 tell(LiveMessage::CannotSay(UnsureStretch::of(last, sections)));
@@ -269,9 +271,10 @@ impl LiveMessages {
         }
     }
 
-    /// Reports the end of the last flagged run once a section beyond the run has a verdict other than fail.
+    /// Reports the end of the most recently flagged run once a section beyond the run has a verdict other
+    /// than fail.
     fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
-        // An open section may still join the run.
+        // An open section, which may still get samples, may still join the run.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
         let ends = sections.get(section).is_some_and(other);
         let run = self.run.and_then(|(id, _)| sections.runs().get(id));
@@ -292,7 +295,7 @@ impl LiveMessages {
         let sections = &dive.view().coverage().sections;
         let Some(run) = sections.runs().get(id) else { return };
         match change {
-            // A part of a reported stretch is no new stretch.
+            // A run within a reported stretch is not a new stretch.
             RunChange::Raised if self.missed.iter().any(|told| told.meets(run)) => {}
             RunChange::Raised => {
                 self.close_run(sections, tell);
@@ -369,7 +372,7 @@ fn alert_change(change: AlertChange, alert: &ListedAlert, at: MonoNs, dive: &Loo
     LiveMessage::AlertChange { change, alert: Box::new(alert.json(&dive.view().surroundings(), at)) }
 }
 
-/// The stretch with the present state of its sections, but with the ends that were reported.
+/// The reported unsure stretch with the present state of its sections, but with the ends that were reported.
 ///
 /// If no section is unsure any more, returns the stretch as it was reported.
 fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
@@ -378,7 +381,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     let Some(mut now) = each.next() else { return *told };
     (now.from, now.to) = (told.from, told.to);
     for here in each {
-        // The bounds include all sections, so the join succeeds.
+        // The bounds already include all sections, so joining them succeeds.
         if !now.join(&here, sections.section_m()) {
             break;
         }
@@ -386,7 +389,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     now
 }
 
-/// Message for a run, beginning at one of its sections.
+/// Message that reports a run as missed, beginning at one of its sections.
 fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> LiveMessage {
     let sections = &dive.view().coverage().sections;
     let from_m = sections.bounds_m(section).0;

@@ -43,7 +43,7 @@ pub enum PositionDoubt {
 }
 
 impl PositionDoubt {
-    /// Word used in JSON.
+    /// Word used for the doubt in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Cable => "cable",
@@ -57,7 +57,7 @@ impl PositionDoubt {
 pub enum PositionState {
     /// There is no position, for this reason.
     None(NoFix),
-    /// There is a position, but it makes the samples placed by it doubtful, for this reason.
+    /// There is a position, but samples placed by it are doubtful, for this reason.
     Doubtful(PositionDoubt),
     /// The position is reliable.
     Ok,
@@ -73,7 +73,7 @@ impl PositionState {
         }
     }
 
-    /// Number used in published data.
+    /// Number used for the availability in published data.
     pub(super) fn number(self) -> u64 {
         match self {
             Self::Ok => 0,
@@ -92,7 +92,7 @@ pub struct LiveMetres {
     pub fail_m: f64,
     /// Metres without a verdict of pass or fail.
     pub cannot_say_m: f64,
-    /// Metres that further driving may still fill.
+    /// Metres still open: further driving may fill their holes.
     pub open_m: f64,
     /// Metres where some heads have not been, because the vehicle began or turned back there.
     pub not_inspected_m: f64,
@@ -141,7 +141,7 @@ pub enum SensorState {
 }
 
 impl SensorState {
-    /// Word used in JSON.
+    /// Word used for the sensor's state in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Never => "never",
@@ -164,7 +164,7 @@ pub struct LiveState {
     pub at: Option<MonoNs>,
     /// Availability of a position.
     pub position: PositionState,
-    /// Chainage; `None` without a position.
+    /// Chainage of the vehicle; `None` without a position.
     pub chainage_m: Option<f64>,
     /// Standard deviations of the pose; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
@@ -176,9 +176,9 @@ pub struct LiveState {
     pub stand_s: u32,
     /// Speed along the tunnel, positive inwards; `None` without a position.
     pub speed_mps: Option<f64>,
-    /// The advice; `None` before the first.
+    /// Speed advice at the last update; `None` before the first.
     pub advice: Option<Advice>,
-    /// Target T.
+    /// Coverage target T.
     pub target_m: f64,
     /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
     pub confidence_sd: f64,
@@ -190,12 +190,13 @@ pub struct LiveState {
     pub metres: LiveMetres,
     /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
-    /// Whether all wall that the heads see here has the verdict pass. The vehicle's chainage and the verdicts
-    /// decide this.
+    /// Whether every part of the wall visible to the heads here has the verdict pass. The vehicle's chainage
+    /// and the verdicts decide this.
     pub passed: bool,
-    /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
+    /// Chainage to which the vehicle goes back for a missed stretch, m; `None` unless the vehicle is on the
+    /// way there.
     pub back_to_m: Option<f64>,
-    /// Observations that hold.
+    /// Observations about the dive that hold now.
     pub(crate) observations: ActiveObservations,
     /// Bitmask of the sources that are profiling heads.
     pub heads: u64,
@@ -248,7 +249,7 @@ impl LiveState {
         }
     }
 
-    /// Chainage of the tunnel's end beyond which all heads are, m; `None` if a head may be inside.
+    /// Chainage of the tunnel's end beyond which all heads are, m; `None` if a head may be inside the tunnel.
     pub fn outside_m(&self) -> Option<f64> {
         let x_m = self.chainage_m?;
         let beyond = x_m > self.length_m + self.heads_reach_m;
@@ -276,7 +277,7 @@ impl LiveState {
         self.heard.get(source).copied().flatten().map(|heard| DurNs(self.now.since(heard).0.max(0)))
     }
 
-    /// State of a sensor, by its source.
+    /// State of the sensor with this source.
     pub fn sensor(&self, source: usize) -> SensorState {
         let bit = |set: u64| {
             u32::try_from(source).is_ok_and(|source| set.checked_shr(source).unwrap_or(0) & 1 == 1)
@@ -319,21 +320,21 @@ impl LiveState {
 
     /// Share of lost returns; `None` unless they reduce the largest speed by at least a fifth.
     pub fn lost_share(&self) -> Option<f64> {
-        /// Share of the speed that remains if losses cost a fifth of it.
+        /// Threshold: share of the speed that remains if losses cost a fifth of it.
         const LEFT: f64 = 0.8;
         let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
         let margins = advice.margins?;
         (margins.losses_mps < LEFT * margins.position_mps).then_some(advice.lost_share)
     }
 
-    /// Bitmask of the kinds of observations that hold.
+    /// Bitmask of the kinds of observations that hold now.
     pub(super) fn observation_bits(&self) -> u64 {
         self.observations.iter().flatten().fold(0, |bits, known| bits | 1 << known.kind as u64)
     }
 }
 
-/// Bitmask of the sources that belong to a set of heads. `sources` are the heads' sources, in order of head
-/// number.
+/// Bitmask of the sources that belong to a set of heads. `sources` lists the source of each head, in order of
+/// head number.
 pub(super) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
     let numbered = sources.enumerate().filter(|(head, _)| of.has(*head));
     numbered.fold(0, |bits, (_, source)| bits | 1 << u64::from(source.0 % 64))

@@ -16,18 +16,18 @@ use headrace_geometry::tunnel::Profile;
 pub struct PilotLine {
     /// Place: one stationing, or two for a stretch.
     pub place: String,
-    /// Speed; empty if it isn't shown.
+    /// Speed of the vehicle; empty if it isn't shown.
     pub speed: String,
     /// Parts of the problem, most important part first. A narrow screen leaves out the last parts.
     pub what: Vec<String>,
     /// Action to take; empty if there is none.
     pub action: String,
-    /// Colour, if any.
+    /// Colour of the line, if any.
     pub lamp: Option<Lamp>,
 }
 
 impl PilotLine {
-    /// The whole line.
+    /// The whole line as text.
     pub fn text(&self) -> String {
         let mut text = format!("{:<9}  ", self.place);
         if !self.speed.is_empty() {
@@ -42,8 +42,7 @@ impl PilotLine {
         text
     }
 
-    /// The line, broken into lines of at most `columns` characters. Continuation lines are indented to where
-    /// the text of the first line begins.
+    /// The pilot's line, broken into lines of at most `columns` characters.
     pub fn broken(&self, columns: usize) -> Vec<String> {
         let whole = self.text();
         if whole.chars().count() <= columns {
@@ -67,7 +66,7 @@ impl PilotLine {
         lines
     }
 
-    /// As much of a status as fits into `columns`.
+    /// As much of a status line as fits into `columns` characters.
     ///
     /// The last parts are left out first, then the speed, then the reason if there is an action. A line that
     /// is still too long is cut off.
@@ -77,11 +76,11 @@ impl PilotLine {
         while is_wide(&line) && line.what.len() > 1 {
             line.what.pop();
         }
-        // The condition matters more than the speed.
+        // The condition matters more to the pilot than the speed.
         if is_wide(&line) {
             line.speed.clear();
         }
-        // The action matters more than the reason.
+        // The action matters more to the pilot than the reason.
         if is_wide(&line)
             && !line.action.is_empty()
             && let Some(what) = line.what.first_mut()
@@ -105,14 +104,14 @@ pub fn status_line(
 ) -> PilotLine {
     let condition = state.condition();
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
-    // Slightly over the limit, within the measurement error, the condition is `Good`.
+    // If the speed exceeds the limit by less than the measurement error, the condition is `Good`.
     let is_over = matches!(condition, Condition::TooFast | Condition::Over | Condition::TurnUnsure);
     let decimals = if is_over { speed_decimals(state.speed_mps, state.v_max_mps()) } else { 2 };
     let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.decimals$} m/s"));
     let what = condition_text(condition, state, &v_max, (profile, heads));
     let action = match condition {
         _ if state.asks_to_stand() => format!("{STAND_STILL} {} s", state.stand_s),
-        // The text states v_max already.
+        // The text of the condition states v_max already.
         Condition::Good => String::new(),
         _ => condition_words(condition).action_text(&v_max),
     };
@@ -249,7 +248,8 @@ pub fn metres_text(metres: &LiveMetres) -> String {
     core::iter::once(passed).chain(parts).collect::<Vec<_>>().join(", ")
 }
 
-/// Length of a part of a stretch, m, as text. The text is empty if the part is empty or the whole stretch.
+/// Length of a part of a stretch, m, as text such as ", 1.25 m of it". The text is empty if the part is empty
+/// or the whole stretch.
 pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
     if part_m <= 0.0 || part_m > whole_m - 1e-6 { String::new() } else { format!(", {part_m:.2} m of it") }
 }
@@ -329,7 +329,7 @@ fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
 }
 
 impl LiveMessage {
-    /// Whether the message's line adds something to the status and the other lines.
+    /// Whether the message's line tells the pilot something that the status line and the other lines don't.
     ///
     /// Among changes of alerts, these add something: acknowledgements, remaining resources, doubts about
     /// sensors, settings and the dive as a whole, and ends that no other line shows.

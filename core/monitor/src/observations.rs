@@ -11,7 +11,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::MAX_HEADS;
 use headrace_sensor::reading::SourceId;
 
-/// Kind of observation. The numbers are recorded in logs.
+/// Kind of observation about the dive as a whole. The numbers are recorded in logs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum ObservedKind {
     /// Samples fall beyond either end of the tunnel.
@@ -37,7 +37,7 @@ const HEAD_KINDS: usize = 3;
 pub(crate) const MOST_OBSERVATIONS: usize = ObservedKind::ALL.len() + 1 - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
 
 impl ObservedKind {
-    /// All kinds.
+    /// All kinds of observations.
     pub(crate) const ALL: [Self; 7] = [
         Self::OutsideTunnel,
         Self::ProfileContradicted,
@@ -48,7 +48,7 @@ impl ObservedKind {
         Self::SettingDoubted,
     ];
 
-    /// Observation of a distrusted head, and its figure, m.
+    /// Observation about a distrusted head, and the figure that led to the distrust, m.
     pub(crate) fn of_distrust(why: Distrust) -> (Self, f64) {
         match why {
             Distrust::Scattered(jump_m) => (Self::HeadScattered, jump_m),
@@ -76,16 +76,16 @@ pub struct Occurrences {
     pub worst_m: f64,
 }
 
-/// An observation with its occurrences.
+/// An observation with its occurrences so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Observation {
     pub(crate) kind: ObservedKind,
     /// The distrusted head, or the velocity log that the cable counter differs from.
     pub(crate) source: Option<SourceId>,
-    /// Time at which the latest occurrence began.
+    /// Time at which the latest occurrence of the observation began.
     pub(crate) latest: MonoNs,
     pub(crate) occurrences: Occurrences,
-    /// Doubtful setting, as last judged.
+    /// Doubtful setting, as judged most recently.
     setting: Option<SettingDoubt>,
 }
 

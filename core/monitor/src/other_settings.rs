@@ -1,4 +1,4 @@
-//! Effect of other head settings: a finer step or a longer range.
+//! Predicted effect of alternative head settings: a finer step or a longer range.
 //!
 //! With either, a turn takes longer. The prediction of a section's hole allows for that.
 
@@ -16,7 +16,7 @@ use headrace_sampling::spacing::speed_for_target_mps;
 use headrace_sensor::device::Device;
 use headrace_vehicle::Mission;
 
-/// Longest range setting tried, m. Settings are tried in whole metres.
+/// Longest range setting that the search tries, m. Settings are tried in whole metres.
 const LONGEST_M: u32 = 200;
 /// Steps that differ by at most this angle count as equal, radians.
 const SAME_STEP_RAD: f64 = 1e-6;
@@ -44,8 +44,8 @@ impl HeadSpecification {
         }
     }
 
-    /// Among the modes with a finer step, the one that allows the fastest speed. If none meets the target:
-    /// the finest one.
+    /// Among the scan modes with a finer step, the one that allows the highest speed. If none meets the
+    /// target: the finest one.
     ///
     /// `t_y_m` converts a step of the head, radians, to the step along the wall, m.
     fn finer(&self, target_m: f64, t_y_m: impl Fn(f64) -> f64) -> Option<&HeadMode> {
@@ -61,7 +61,8 @@ impl HeadSpecification {
         fastest.map(|(mode, _)| mode).or_else(finest)
     }
 
-    /// Wall as seen with the vehicle level in the tunnel's centre; `None` if the head is outside then.
+    /// Wall as seen by the head with the vehicle level in the tunnel's centre; `None` if the head is outside
+    /// the profile then.
     fn ring_in_the_middle(&self, profile: &Profile, rays: u32) -> Option<Ring> {
         let [y, z] = profile.reference();
         let pose = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
@@ -69,7 +70,8 @@ impl HeadSpecification {
     }
 }
 
-/// Shortest range setting that reaches all wall from the tunnel's centre, m, and the modes at that setting.
+/// Shortest range setting that reaches all wall from the tunnel's centre, m, and the head's scan modes at
+/// that setting.
 ///
 /// The setting is the head's own or a longer one. `None` if no setting reaches all wall.
 fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(f64, Vec<HeadMode>)> {
@@ -84,7 +86,8 @@ fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(
     longer_m.into_iter().find_map(|range_m| Some((range_m, device.modes(Some(range_m)).ok()?)))
 }
 
-/// Largest ratios among the heads: the head with the largest change decides for the vehicle.
+/// Largest ratios of step and turn period, alternative to present setting. The head with the largest change
+/// decides for the vehicle.
 pub(super) fn of_heads(world: &mut World, profile: &Profile, target_m: f64) -> OtherSettings {
     let mut heads = world.query::<&HeadSpecification>();
     let farthest_m = profile.farthest_m(profile.reference());
@@ -104,8 +107,8 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    // The steps assume perpendicular beams. The samples of the trial show whether the mode is also fine
-    // enough in corners.
+    // The steps computed above assume perpendicular beams. The samples of the trial show whether the mode is
+    // also fine enough in corners.
     let chosen = head.finer(target_m, |step_rad| step_rad * farthest_m);
     OtherSettings {
         finer_step: chosen.map_or(1.0, |mode| mode.turn.step_rad() / spec.step_rad),

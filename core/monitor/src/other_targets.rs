@@ -1,4 +1,4 @@
-//! Alternatives: verdicts on the samples of a dive for other targets and section lengths.
+//! Verdicts that the samples of a dive would have for other targets and section lengths.
 
 use headrace_coverage::Verdict;
 use serde::Serialize;
@@ -14,18 +14,18 @@ pub struct OtherTargetReport {
     pub section_m: f64,
     /// Metres of sections that would pass.
     pub pass_m: f64,
-    /// Metres that would fail.
+    /// Metres of sections that would fail.
     pub fail_m: f64,
-    /// Metres undecided within the error of the hole.
+    /// Metres of sections that would be undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// Metres that would still be open.
+    /// Metres of sections that would still be open.
     pub open_m: f64,
-    /// Metres where some heads would not have been.
+    /// Metres of sections where some heads would not have been.
     pub not_inspected_m: f64,
 }
 
 impl Loop {
-    /// Present verdicts for another target, as section index and verdict.
+    /// Verdicts that the sections would have at present for another target, as section index and verdict.
     ///
     /// Only sections whose hole has been measured are included.
     pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {

@@ -1,4 +1,4 @@
-//! Outlets: readers of each tick's results, such as a recorder.
+//! Outlets: readers of each tick's results, such as a log recorder.
 
 use super::view::DiveView;
 

@@ -19,19 +19,19 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 pub struct Part<S> {
     pub(super) world: World,
     stages: Vec<Systems<S>>,
-    /// Entities whose components are state, in snapshot order.
+    /// Entities whose components are part of the saved state, in snapshot order.
     pub(super) entities: Vec<Entity>,
     state: Vec<StateKind>,
 }
 
-/// Systems of a stage.
+/// Systems of a stage, with their schedule.
 struct Systems<S> {
     stage: S,
     schedule: Schedule,
     is_empty: bool,
 }
 
-/// A kind of state: name, type of the resource or component, and functions to save and restore it.
+/// A kind of saved state: name, type of the resource or component, and functions to save and restore it.
 struct StateKind {
     kind: TypeId,
     name: &'static str,
@@ -106,7 +106,7 @@ impl<S: Stage> Part<S> {
         self.schedule(stage).add_systems(systems.in_set(Order::Within));
     }
 
-    /// Adds systems that run when a stage has finished, such as measurements of it.
+    /// Adds systems that run when a stage has finished, such as systems that measure its run time.
     pub fn add_systems_after<M>(&mut self, stage: S, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
         self.schedule(stage).add_systems(systems.in_set(Order::After));
     }
@@ -147,7 +147,7 @@ impl<S: Stage> Part<S> {
         }
     }
 
-    /// Saves the state.
+    /// Saves the state to a snapshot.
     pub(super) fn save(&self, to: &mut Saver) {
         for state in &self.state {
             to.part(state.name);
@@ -155,7 +155,7 @@ impl<S: Stage> Part<S> {
         }
     }
 
-    /// Restores the state.
+    /// Restores the state from a snapshot.
     ///
     /// Errors: the snapshot comes from another vehicle or version.
     pub(super) fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {

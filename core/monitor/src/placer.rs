@@ -36,22 +36,22 @@ use sound_speed::SoundSpeed;
 /// Capacity for the readings of one tick. The shortest frame of any device has over ten bytes.
 pub(super) const MAX_TICK_READINGS: usize = MAX_TICK_BYTES / 8;
 
-/// Part of the loop from packets to placed pings.
+/// Part of the loop that converts packets to placed pings.
 pub struct Placer {
     part: Part<PlaceStage>,
     readers: Vec<PortReader>,
 }
 
-/// Results of the placer for a tick. The other parts read nothing else of it.
+/// Results of the placer for a tick. The other parts of the loop read no other data of the placer.
 ///
 /// The lists are reused from tick to tick. In a default value they grow as needed.
 #[derive(Debug, Default)]
 pub struct Placed {
-    /// Packets, in the order of consumption.
+    /// Packets of the tick, in the order of consumption.
     pub inbox: Inbox,
-    /// Readings, in order.
+    /// Readings of the tick, in order.
     pub events: Vec<Event>,
-    /// Pings and updates, in order.
+    /// Placed pings and updates of the tick, in order.
     pub items: Vec<PlacedItem>,
     /// Commands of the operator, in order.
     pub(super) commands: Commands,
@@ -61,12 +61,12 @@ pub struct Placed {
     pub health: Vec<SensorHealth>,
     /// Traffic of the operator's input so far.
     pub(super) console: ConsoleCounts,
-    /// Poses at the updates.
+    /// Result stream of the vehicle's poses at the updates.
     pub(super) poses: ResultStream,
 }
 
 impl Placed {
-    /// Pings, in order.
+    /// Placed pings of the tick, in order.
     pub fn pings(&self) -> impl Iterator<Item = &PlacedPing> {
         self.items.iter().filter_map(|item| match &item.placement {
             Placement::Ping(ping) => Some(ping),
@@ -74,7 +74,7 @@ impl Placed {
         })
     }
 
-    /// Updates, in order.
+    /// Updates of the tick, in order.
     pub fn updates(&self) -> impl Iterator<Item = &Update> {
         self.items.iter().filter_map(|item| match &item.placement {
             Placement::Update(update) => Some(update),
@@ -93,7 +93,7 @@ impl Placed {
         spans.reduce(|(first, last), (from, to)| (first.min(from), last.max(to)))
     }
 
-    /// Returns an empty tick that follows this one.
+    /// Returns the placer's results for an empty tick that follows this tick.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut poses = self.poses.clone();
         poses.next_tick();
@@ -102,7 +102,7 @@ impl Placed {
     }
 }
 
-/// The tick's [`Placed`] in a world that reads it.
+/// Resource by which another world reads the tick's [`Placed`].
 #[derive(Debug, Default, Resource)]
 pub struct PlacedTick(pub(super) Arc<Placed>);
 
@@ -128,7 +128,7 @@ impl Placer {
             poses.0.keep();
         }
         part.insert_state("poses", poses);
-        // During a tick, these are swapped with the lists of `Placed`.
+        // During a tick, these lists are swapped with those of `Placed`.
         part.insert_resource(Inbox::default());
         part.insert_resource(Events::default());
         part.insert_resource(PlacedList::default());

@@ -10,7 +10,7 @@ use headrace_geometry::snapshot::stateful;
 /// Capacity of a stream per tick, words. Words beyond it are hashed, but they are not kept and count as lost.
 const MAX_TICK_WORDS: usize = 1 << 16;
 
-/// Kind of a record.
+/// Kind of a record in a result stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordKind {
     /// A ping that gave a sample.
@@ -21,7 +21,7 @@ pub enum RecordKind {
     Section = 3,
     /// A changed run of sections.
     Run = 4,
-    /// Advice.
+    /// Speed advice.
     Advice = 5,
     /// A pose of the vehicle.
     Pose = 6,
@@ -50,7 +50,7 @@ pub enum WordKind {
     Number,
 }
 
-/// Words of a section.
+/// Names and types of the words in a judged section's record.
 const SECTION: [(&str, WordKind); 17] = [
     ("at_ns", WordKind::Integer),
     ("section", WordKind::Integer),
@@ -61,7 +61,7 @@ const SECTION: [(&str, WordKind); 17] = [
     ("cause", WordKind::Integer),
     ("hole_x_m", WordKind::Number),
     ("hole_arc_m", WordKind::Number),
-    // The words from here on are present only if the section has a cause.
+    // The following words are present only if the section has a cause.
     ("speed_mps", WordKind::Number),
     ("t_y_m", WordKind::Number),
     ("middle_t_y_m", WordKind::Number),
@@ -69,11 +69,11 @@ const SECTION: [(&str, WordKind); 17] = [
     ("swing_m", WordKind::Number),
     ("silent_heads", WordKind::Integer),
     ("causes", WordKind::Integer),
-    // Present only if lost returns need a lower speed.
+    // Present only if lost returns reduce the speed.
     ("with_losses_mps", WordKind::Number),
 ];
 
-/// Words of a change of an alert.
+/// Names and types of the words in an alert change's record.
 const ALERT_CHANGE: [(&str, WordKind); 16] = [
     ("at_ns", WordKind::Integer),
     ("number", WordKind::Integer),
@@ -92,7 +92,7 @@ const ALERT_CHANGE: [(&str, WordKind); 16] = [
     ("x_m", WordKind::Number),
     ("figure", WordKind::Number),
 ];
-/// Words of a voice note.
+/// Names and types of the words in a voice note's record.
 const VOICE: [(&str, WordKind); 7] = [
     ("at_ns", WordKind::Integer),
     ("number", WordKind::Integer),
@@ -102,7 +102,7 @@ const VOICE: [(&str, WordKind); 7] = [
     ("id", WordKind::Integer),
     ("seconds", WordKind::Integer),
 ];
-/// Words of a note. The words of its text follow.
+/// Names and types of the words in a note's record. The words of the note's text follow.
 const NOTE: [(&str, WordKind); 5] = [
     ("at_ns", WordKind::Integer),
     ("number", WordKind::Integer),
@@ -128,12 +128,12 @@ impl RecordKind {
         Self::Voice,
     ];
 
-    /// Kind with this number.
+    /// Record kind with this number.
     pub fn of(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| *kind as u8 == number)
     }
 
-    /// Name of the kind.
+    /// Name of the record kind.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Sample => "sample",
@@ -152,7 +152,7 @@ impl RecordKind {
         }
     }
 
-    /// Name and type of the word at `place`.
+    /// Name and type of the record's word at index `place`.
     pub fn field(self, place: usize) -> (&'static str, WordKind) {
         use WordKind::{Integer, Number};
         let fields: &[(&str, WordKind)] = match self {
@@ -233,8 +233,8 @@ impl RecordKind {
             Self::Note => &NOTE,
             Self::Voice => &VOICE,
         };
-        // All words beyond the last field have the same name and type. In advice they are the speeds that
-        // other modes allow, in the live state each source's last reading, and in a note its text.
+        // All words beyond the last field have the same name and type. They are the speeds that alternative
+        // modes allow (advice), the time of each source's last reading (live state), or the text (note).
         let beyond = match self {
             Self::Advice => ("alternative_v_max_mps", Number),
             Self::State => ("heard_ns", Integer),
@@ -250,7 +250,7 @@ impl RecordKind {
 pub struct ResultStream {
     digest: Digest,
     words: Vec<u64>,
-    /// Capacity per tick, words; zero unless words are kept.
+    /// Capacity for words per tick; zero unless words are kept.
     room: usize,
     head: usize,
     records: u64,
@@ -266,7 +266,7 @@ impl ResultStream {
         self.words.reserve_exact(self.room);
     }
 
-    /// Begins a record.
+    /// Begins a record of the stream.
     pub(super) fn record(&mut self, kind: RecordKind) -> &mut Self {
         self.records += 1;
         self.head = self.words.len();
@@ -274,21 +274,21 @@ impl ResultStream {
         self
     }
 
-    /// Adds an integer.
+    /// Adds an integer to the present record.
     pub(super) fn integer(&mut self, value: u64) -> &mut Self {
         self.digest.integer(value);
         self.word(value);
         self
     }
 
-    /// Adds the bits of a number; -0 counts as +0.
+    /// Adds the bits of a number to the present record; -0 counts as +0.
     pub(super) fn number(&mut self, value: f64) -> &mut Self {
         self.digest.number(value);
         self.word((value + 0.0).to_bits());
         self
     }
 
-    /// The digest so far.
+    /// The digest of all words so far.
     pub fn value(&self) -> u64 {
         self.digest.value()
     }
@@ -308,7 +308,7 @@ impl ResultStream {
         self.lost
     }
 
-    /// Adds the first 16 bytes of a text, as two integers.
+    /// Adds the first 16 bytes of a text to the present record, as two integers.
     pub(super) fn text(&mut self, text: &str) -> &mut Self {
         let mut bytes = [0; 16];
         bytes.iter_mut().zip(text.bytes()).for_each(|(byte, of)| *byte = of);
@@ -358,20 +358,20 @@ impl ResultStream {
 /// One record of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record<'a> {
-    /// Kind; `None` if this version doesn't know it.
+    /// Kind of the record; `None` if this version doesn't know it.
     pub kind: Option<RecordKind>,
-    /// Words.
+    /// Words of the record.
     pub words: &'a [u64],
 }
 
-/// Text encoded in two words of a record.
+/// Text decoded from two words of a record.
 pub fn text_of(words: [u64; 2]) -> String {
     let bytes = words.map(u64::to_le_bytes);
     let text = bytes.as_flattened().iter().copied().take_while(|byte| *byte != 0).collect::<Vec<_>>();
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// First of a sequence of records, and the words after it.
+/// First record of a word sequence, and the words after it.
 ///
 /// `None` if there are no more words, or if the record is incomplete.
 pub fn first_record(words: &[u64]) -> Option<(Record<'_>, &[u64])> {

@@ -15,17 +15,17 @@ pub struct SectionJudgement {
     pub index: i64,
     /// Change that the judgement made.
     pub change: Judgement,
-    /// Verdict.
+    /// Verdict on the section.
     pub verdict: Verdict,
-    /// Diameter of the hole, m; 0 if the hole wasn't measured.
+    /// Diameter of the section's largest hole, m; 0 if the hole wasn't measured.
     pub hole_m: f64,
-    /// Standard deviation of the diameter, m.
+    /// Standard deviation of that diameter, m.
     pub hole_sd_m: f64,
     /// Chainage of the hole's centre, m; 0 if the hole wasn't measured.
     pub hole_x_m: f64,
     /// Arc length of the hole's centre, m; 0 if the hole wasn't measured.
     pub hole_arc_m: f64,
-    /// Evidence for the cause; `None` before the first fail.
+    /// Evidence for the cause of a fail; `None` before the section's first fail.
     pub cause: Option<CauseFigures>,
 }
 
@@ -54,7 +54,8 @@ pub(super) fn record(to: &mut ResultStream, at: MonoNs, index: i64, change: Judg
 }
 
 impl SectionJudgement {
-    /// Reads the words of a record; `None` if they are too few, or name an unknown change or verdict.
+    /// Reads a judgement from the words of its record; `None` if they are too few, or name an unknown change
+    /// or verdict.
     ///
     /// Earlier versions recorded fewer figures of the cause.
     pub fn read(words: &[u64]) -> Option<Self> {
@@ -161,7 +162,7 @@ mod tests {
         let mut unknown = words.clone();
         unknown[3] = 9;
         assert_eq!(SectionJudgement::read(&unknown), None);
-        // Earlier versions recorded no figure after the swing.
+        // Earlier versions recorded no figure after the swing distance.
         let earlier = SectionJudgement::read(&words[..14]).unwrap().cause.unwrap();
         assert_eq!((earlier.causes, earlier.silent_heads), (Causes::of(Cause::TooFast), HeadSet::default()));
     }

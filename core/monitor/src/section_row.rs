@@ -7,25 +7,25 @@ use headrace_coverage::{Evidence, Section, Sections, Unsure, Verdict};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 
-/// One section.
+/// One section with its verdict and figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SectionRow {
     /// Chainage of the section's start, as a multiple of the section length.
     #[serde(skip)]
     pub index: i64,
-    /// Beginning, m.
+    /// Beginning of the section, m.
     pub start_m: f64,
-    /// End, m.
+    /// End of the section, m.
     pub end_m: f64,
     /// Diameter of the section's largest hole, m; `None` if the hole wasn't measured.
     pub hole_m: Option<f64>,
-    /// Lower bound of the diameter, m. Samples that were dropped may have divided the hole.
+    /// Lower bound of the hole's diameter, m. Samples that were dropped may have divided the hole.
     pub hole_least_m: Option<f64>,
-    /// Upper bound of the diameter, m; `None` if unbounded.
+    /// Upper bound of the hole's diameter, m; `None` if unbounded.
     pub hole_most_m: Option<f64>,
     /// Whether there are samples around the hole. If not, the diameter is at least `hole_m`.
     pub hole_bounded: bool,
-    /// Standard deviation of the diameter, m.
+    /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
     /// Chainage of the hole's centre, m.
     pub hole_x_m: Option<f64>,
@@ -34,21 +34,21 @@ pub struct SectionRow {
     /// Clock position of the hole's centre, looking along the tunnel: 6 is the floor's centre, 9 the left
     /// wall.
     pub hole_clock: Option<String>,
-    /// Distance between passes.
+    /// Distance along the tunnel between passes of heads over the same arc length.
     pub t_x: SpreadReport,
-    /// Distance between neighbours of one sweep.
+    /// Distance between neighbouring samples of one sweep.
     pub t_y: SpreadReport,
-    /// Lattice diagonal.
+    /// Diagonal of the lattice formed by neighbouring samples of neighbouring passes.
     pub t: SpreadReport,
     /// Number of samples on the section's wall.
     pub samples: u32,
-    /// Samples per square metre of wall.
+    /// Number of samples per square metre of the section's wall.
     pub density_perm2: f64,
     /// Deviation of the section's wall from the design profile; `None` without samples.
     pub deviation: Option<DeviationReport>,
     /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
-    /// `pass`, `fail`, `cannot_say` or `open`.
+    /// Verdict: `pass`, `fail`, `cannot_say` or `open`.
     #[serde(serialize_with = "verdict_word")]
     pub verdict: Verdict,
     /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
@@ -58,10 +58,11 @@ pub struct SectionRow {
     ///
     /// The vehicle began or turned back there, so some heads have not been in the section.
     pub not_inspected: bool,
-    /// Reason for `cannot_say`, or `NotInspected`, which the report leaves to `not_inspected`.
+    /// Reason for `cannot_say`. For a section with `not_inspected`, the reason is `NotInspected`, which the
+    /// report omits.
     #[serde(serialize_with = "reason_word")]
     pub cannot_say: Option<Unsure>,
-    /// Evidence for the cause; `None` unless the verdict is `fail`.
+    /// Evidence for the cause of a fail; `None` unless the verdict is `fail`.
     pub cause: Option<Evidence>,
     /// Time at which the section was flagged, seconds on the log's clock.
     pub flagged_s: Option<f64>,
@@ -78,7 +79,7 @@ pub struct SectionRow {
 /// positive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DeviationReport {
-    /// Mean, m.
+    /// Mean deviation, m.
     pub mean_m: f64,
     /// Largest inward deviation, m; never above zero.
     pub inmost_m: f64,
@@ -86,7 +87,7 @@ pub struct DeviationReport {
     pub outmost_m: f64,
     /// Ratio of the cross-section area to the design's; `None` without sweeps.
     pub area_ratio: Option<f64>,
-    /// Whether most samples exceed the contradiction limit.
+    /// Whether most samples deviate by more than the contradiction limit.
     pub contradicts: bool,
 }
 

@@ -28,13 +28,13 @@ impl Stage for PlaceStage {
 /// Stages of the surveyor: from placed pings to verdicts.
 ///
 /// Verdicts decide which sections are due next. The stages from [`Self::Walk`] to [`Self::Report`] therefore
-/// run once per stop: a ping that makes sections due, or an update. [`Self::Classify`] runs once per tick with pings or
-/// updates, [`Self::Surveyed`] once per tick.
+/// run once per stop. A stop is a ping that makes sections due, or an update. [`Self::Classify`] runs once
+/// per tick with pings or updates, [`Self::Surveyed`] once per tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum SurveyStage {
     /// Decides which returns are wall.
     Classify,
-    /// Converts pings to samples and passes, up to the next stop.
+    /// Converts pings to samples and passes, up to the next ping that makes sections due or the next update.
     Walk,
     /// Judges the sections that are due.
     Judge,
@@ -45,7 +45,7 @@ pub enum SurveyStage {
 }
 
 impl SurveyStage {
-    /// Stages that run once per stop, in order.
+    /// Stages that run each time the surveyor stops to judge sections or to process an update, in order.
     pub(super) const OF_STOP: [Self; 3] = [Self::Walk, Self::Judge, Self::Report];
 }
 

@@ -43,7 +43,7 @@ use survey::{Cursor, Requests};
 /// Part of the loop from placed pings to verdicts.
 pub struct Surveyor {
     part: Part<SurveyStage>,
-    /// An empty tick. The world holds it between ticks.
+    /// Empty tick for the placer's values. The surveyor keeps it as a placeholder between ticks.
     nothing: Arc<Placed>,
 }
 
@@ -110,7 +110,7 @@ impl Surveyor {
         self.part.world.resource_mut::<Digests>().next_tick();
     }
 
-    /// Findings of the last tick.
+    /// Results of the surveyor in the last tick.
     pub fn found(&self) -> &Found {
         self.part.world.resource()
     }
@@ -130,7 +130,7 @@ impl Surveyor {
         self.part.world.resource()
     }
 
-    /// Result streams.
+    /// Result streams of the surveyor.
     pub fn digests(&self) -> &Digests {
         self.part.world.resource()
     }
@@ -154,7 +154,7 @@ impl Surveyor {
         wall::end_returns(&mut self.part.world);
     }
 
-    /// Sections to be judged at the end of a dive, and the fields common to all requests for them.
+    /// Requests to judge sections at the end of a dive, and the fields that all these requests share.
     pub(super) fn open_requests(&mut self, at: MonoNs) -> (Vec<i64>, Option<Request>) {
         let outlook = self.outlook(at);
         let (mut open, mut common) = (Vec::new(), None);

@@ -1,5 +1,5 @@
-//! The view: everything that outlets and plugins can read of a tick. It borrows the values of the parts and
-//! computes nothing.
+//! The view: everything that outlets and plugins can read after a tick. It borrows the values of the parts
+//! and computes nothing.
 
 use super::adviser::Advised;
 use super::alert_list::{AlertList, TextContext};
@@ -24,15 +24,15 @@ use headrace_vehicle::Mission;
 /// Mission and sensors of a loop; constant after arming.
 #[derive(Debug)]
 pub struct About {
-    /// Tunnel and target.
+    /// Tunnel and coverage target.
     pub mission: Mission,
     /// Sources of the sensors, in the order of their ids. The operator's input is not among them.
     pub sources: Vec<SourceInfo>,
-    /// Names of the heads and their alternative settings.
+    /// Names of the heads, and the alternative settings that could be advised.
     pub descriptions: HeadDescriptions,
 }
 
-/// The loop after a tick.
+/// Read-only view of the loop after a tick.
 #[derive(Clone, Copy)]
 pub struct DiveView<'a> {
     pub(super) about: &'a About,
@@ -44,7 +44,7 @@ pub struct DiveView<'a> {
 }
 
 impl<'a> DiveView<'a> {
-    /// Tunnel and target.
+    /// Tunnel and coverage target.
     pub fn mission(&self) -> &'a Mission {
         &self.about.mission
     }
@@ -54,17 +54,17 @@ impl<'a> DiveView<'a> {
         &self.about.sources
     }
 
-    /// Names of the heads and their alternative settings.
+    /// Names of the heads, and the alternative settings that could be advised.
     pub fn head_descriptions(&self) -> &'a HeadDescriptions {
         &self.about.descriptions
     }
 
-    /// Number and end of the tick.
+    /// Number and end time of the tick.
     pub fn time(&self) -> TickTime {
         self.time
     }
 
-    /// Results of the placer.
+    /// Results of the placer for the tick.
     pub fn placed(&self) -> &'a Placed {
         self.placed
     }
@@ -74,7 +74,7 @@ impl<'a> DiveView<'a> {
         self.surveyor
     }
 
-    /// Advice of the tick.
+    /// Speed advice of the tick.
     pub fn advised(&self) -> &'a Advised {
         self.advised
     }
@@ -131,7 +131,7 @@ impl<'a> DiveView<'a> {
         &self.alerter.notes
     }
 
-    /// Traffic of the operator's input.
+    /// Traffic statistics of the operator's input.
     pub fn console_counts(&self) -> ConsoleCounts {
         ConsoleCounts { without_effect: self.alerter.without_effect, ..self.placed.console }
     }

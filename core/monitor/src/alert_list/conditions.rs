@@ -16,7 +16,7 @@ use headrace_sensor::reading::SourceId;
 
 /// Grace period after the first update. Data or positions that haven't arrived by its end count as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
-/// Time for which `CannotSay` stays active after the last growth of its stretch.
+/// Time for which the alert `CannotSay` stays active after its stretch without a verdict last grew.
 const GROWS: DurNs = DurNs(10_000_000_000);
 /// Thresholds for the remaining cable, time and charge, percent, at which a warning, an alarm and an
 /// emergency alarm are raised.
@@ -29,7 +29,7 @@ const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
 /// alert ends.
 const MORE_PCT: f64 = 2.0;
 
-/// Record of the data and positions that have arrived so far.
+/// Record of which kinds of data and positions have arrived so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Had {
     position: bool,
@@ -40,7 +40,7 @@ pub(super) struct Had {
     unsure: Option<(Stretch, MonoNs)>,
 }
 
-/// An update, with the state as of that time.
+/// An advice update, with the live state at that time.
 pub(crate) struct Beat<'a> {
     pub(crate) at: MonoNs,
     /// Live state whose `now` is the time of the update.
@@ -48,7 +48,7 @@ pub(crate) struct Beat<'a> {
     pub(crate) setting: Option<SettingDoubt>,
 }
 
-/// A condition that was checked, and whether it holds.
+/// Result of checking a condition: whether it holds.
 pub(super) struct Seen {
     pub(super) kind: ListKind,
     pub(super) source: Option<SourceId>,
@@ -121,8 +121,8 @@ impl AlertList {
             .advice
             .as_ref()
             .map_or(Figures::None, |advice| Figures::Advice(AdviceFigures::of(advice, speed_mps)));
-        // Slightly over v_max the alert neither begins nor ends, because that range of speeds is its dead
-        // band.
+        // Slightly over v_max the alert neither begins nor ends, because that range of speeds is the alert's
+        // dead band.
         let is_over = condition == Condition::Over && self.is_active(ListKind::TooFast, None);
         let too_fast = condition == Condition::TooFast || is_over;
         self.observe(at, &Seen::of(ListKind::TooFast, too_fast, figures), to);
@@ -136,7 +136,7 @@ impl AlertList {
             PositionState::None(lacking) => (true, Figures::MissingRequirement(lacking)),
             _ => (false, Figures::None),
         };
-        // Navigation needs time to align before it gives the first position.
+        // Inertial navigation needs time to align before it gives the first position.
         let is_late = at.since(begun).0 >= GRACE.0;
         let lacks = lacks && (self.had.position || is_late);
         self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
@@ -148,7 +148,8 @@ impl AlertList {
 
     fn take_unsure(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
         let Beat { at, state, .. } = *beat;
-        // Stretches at the ends of the coverage extent are reported once the vehicle has left them.
+        // Stretches at the ends of the coverage extent (the tunnel that the vehicle has visited) are reported
+        // once the vehicle has left them.
         let now = state.unsure.filter(|stretch| stretch.why != Unsure::NotInspected);
         let before = self.had.unsure;
         if now.is_some() && now != before.map(|(stretch, _)| stretch) {
@@ -185,7 +186,7 @@ impl AlertList {
         }
     }
 
-    /// Adds the observations made at the end of a dive, without a hold time.
+    /// Adds alerts for the observations made at the end of a dive, without a hold time.
     ///
     /// If an observation has an alert already, only the alert's figures change.
     pub(crate) fn take_observations_at_end(

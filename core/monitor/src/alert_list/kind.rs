@@ -20,7 +20,7 @@ pub enum Priority {
 }
 
 impl Priority {
-    /// Word used in JSON.
+    /// Word used for the priority in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Caution => "caution",
@@ -36,13 +36,13 @@ impl Priority {
 pub enum ListKind {
     /// Sections are flagged as missed.
     Missed,
-    /// Newly judged sections get no verdict.
+    /// Newly judged sections are undecided: they neither pass nor fail.
     CannotSay,
     /// The speed is over v_max.
     TooFast,
-    /// No speed meets the target.
+    /// No speed meets the coverage target.
     NoSpeed,
-    /// The present turn misses the target although the speed is within v_max.
+    /// The present turn of the heads misses the target although the speed is within v_max.
     TurnFails,
     /// There is no position.
     NoPosition,
@@ -72,11 +72,11 @@ pub enum ListKind {
     ProfileContradicted,
     /// A log recording fails.
     NotRecorded,
-    /// Little cable is left.
+    /// Little cable is left on the drum.
     CableLeft,
-    /// Little time is left.
+    /// Little of the planned dive time is left.
     TimeLeft,
-    /// Little charge is left.
+    /// Little battery charge is left.
     BatteryLeft,
     /// A head turns and pings without detecting the wall.
     SensorDeaf,
@@ -85,7 +85,7 @@ pub enum ListKind {
 }
 
 impl ListKind {
-    /// All kinds.
+    /// All kinds of alerts.
     pub const ALL: [Self; 24] = [
         Self::Missed,
         Self::CannotSay,
@@ -113,7 +113,7 @@ impl ListKind {
         Self::SensorHung,
     ];
 
-    /// Word used in JSON.
+    /// Word used for the alert kind in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Missed => "missed",
@@ -143,7 +143,7 @@ impl ListKind {
         }
     }
 
-    /// Class, which decides muting and hold times.
+    /// Class of the alert kind, which decides muting and hold times.
     pub fn class(self) -> AlertClass {
         match self {
             Self::Missed | Self::CannotSay => AlertClass::Coverage,
@@ -168,7 +168,7 @@ impl ListKind {
         }
     }
 
-    /// Priority when the alert is raised. It may rise later as cable, time or charge runs out.
+    /// Priority of the alert when it is raised. It may rise later as cable, time or charge runs out.
     pub fn priority(self) -> Priority {
         match self {
             Self::CannotSay | Self::TurnFails => Priority::Caution,

@@ -9,7 +9,7 @@ use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _};
 use headrace_vehicle::ClassTiming;
 use proptest::prelude::*;
 
-/// A list, and the context for its changes.
+/// An alert list for a test, and the context in which its changes are published.
 struct Bench {
     list: AlertList,
     notices: Vec<Notice>,
@@ -28,7 +28,7 @@ impl Bench {
         }
     }
 
-    /// The same list after its state has passed through a snapshot.
+    /// The same alert list after its state has been saved to a snapshot and restored.
     fn restored(self) -> Self {
         let mut saver = Saver::default();
         self.list.save(&mut saver);
@@ -55,10 +55,10 @@ impl Bench {
     }
 }
 
-/// Possible events.
+/// Events that the random alert test may generate.
 #[derive(Debug, Clone, Copy)]
 enum Happens {
-    /// An update, with the conditions that hold.
+    /// An advice update, with the conditions that hold.
     Beat([bool; 3]),
     AcknowledgeNewest,
     AcknowledgeAll,
@@ -66,7 +66,7 @@ enum Happens {
     Snapshot,
 }
 
-/// One kind for each of three priorities. Each kind has a single situation.
+/// One alert kind for each of three priorities. Each kind has a single situation.
 const KINDS: [ListKind; 3] = [ListKind::TooFast, ListKind::NotRecorded, ListKind::TurnFails];
 const BEAT_MS: u64 = 200;
 
@@ -81,7 +81,7 @@ struct Oracle {
 }
 
 impl Oracle {
-    /// Times for which the condition has held and for which it hasn't, up to now.
+    /// Durations for which the condition has held, and for which it hasn't, up to now.
     ///
     /// Breaks shorter than `least_ms` count as time for which the condition held.
     fn spells_ms(&self, least_ms: u64) -> (Option<u64>, Option<u64>) {
@@ -91,7 +91,7 @@ impl Oracle {
             back.last().map(|(at, _)| *at)
         };
         let off = off_from(self.history.len()).map(|from| now - from);
-        // The first time at which the condition held after the last long break.
+        // The first time at which the condition held after the last break that was long enough to count.
         let (mut on, mut break_from) = (None, None);
         for (at, held) in &self.history {
             if *held {
@@ -115,7 +115,7 @@ impl Oracle {
             "active unacknowledged" | "active acknowledged" | "active caution"
                 if off.is_some_and(|off| off >= off_ms) =>
             {
-                // A situation starts afresh after its alert has ended.
+                // A condition starts afresh after its alert has ended.
                 self.history.clear();
                 self.all.last_mut().unwrap().1 =
                     if state == "active unacknowledged" { "rectified unacknowledged" } else { "cleared" };
@@ -339,7 +339,7 @@ fn alert_spans_only_wall_that_is_still_missed() {
     bench.run(0, RunChange::Changed, (40, 64), None);
     bench.run(0, RunChange::Changed, (40, 52), None);
     assert_eq!(stretch(&bench), Some((40, 52)), "the far end was passed again");
-    // A second pass covers the middle. The alert then has two runs.
+    // A second pass covers the middle of the missed stretch. The alert then has two runs.
     bench.run(1, RunChange::Raised, (48, 52), None);
     bench.run(0, RunChange::Changed, (40, 44), None);
     assert_eq!((stretch(&bench), bench.list.iter().count()), (Some((40, 52)), 1));
@@ -359,7 +359,8 @@ fn merged_runs_keep_the_lower_number_and_stay_unacknowledged() {
     let [kept, gone] = [1, 2].map(|number| *bench.list.get(number).unwrap());
     assert_eq!((kept.stretch, kept.count, kept.needs_acknowledgement()), (Some((10, 15)), 2, true));
     assert_eq!((gone.state, gone.merged_into), (AlertState::Cleared, Some(1)));
-    // A later pass covers the middle, so the alert has two runs. Then both are covered.
+    // A later pass covers the middle of the missed stretch, so its alert has two runs. Then both runs are
+    // covered.
     bench.run(2, RunChange::Raised, (13, 15), None);
     bench.run(0, RunChange::Changed, (10, 12), None);
     assert_eq!(bench.list.raised(), 2);

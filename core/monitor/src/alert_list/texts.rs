@@ -12,10 +12,10 @@ use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
 use headrace_coverage::{Sections, Stretch};
 use headrace_geometry::tunnel::Profile;
 
-/// Properties of the dive that the texts need.
+/// Properties of the dive that the alert texts need.
 #[derive(Debug, Clone, Copy)]
 pub struct TextContext<'a> {
-    /// Sources, for their ids.
+    /// Sources, for the sensor ids that alert texts name.
     pub sources: &'a [SourceInfo],
     /// Tunnel profile, for clock positions.
     pub profile: &'a Profile,
@@ -23,16 +23,16 @@ pub struct TextContext<'a> {
     pub section_m: f64,
     /// Target T, m.
     pub target_m: f64,
-    /// Confidence: number of standard deviations of the hole by which a verdict must clear the target.
+    /// Confidence: number of standard deviations by which a hole's size must clear the target for a verdict.
     pub confidence_sd: f64,
-    /// Sections, for the place to go back to.
+    /// Sections of the tunnel, from which the place to go back to is found.
     pub sections: &'a Sections,
-    /// Names and other settings of the heads.
+    /// Names of the heads, and the alternative settings that could be advised.
     pub heads: &'a HeadDescriptions,
 }
 
 impl<'a> TextContext<'a> {
-    /// Context for the texts of a dive's alerts.
+    /// Context from which the texts of a dive's alerts are made.
     pub(crate) fn of(
         sources: &'a [SourceInfo],
         profile: &'a Profile,
@@ -68,7 +68,7 @@ impl ListedAlert {
         }
     }
 
-    /// Text of the problem.
+    /// Text of the problem that the alert reports.
     pub fn text(&self, around: &TextContext<'_>) -> String {
         let name = self.source.map(|source| around.name(source.index())).unwrap_or_default();
         let place = match self.bounds_m(around.section_m) {
@@ -114,7 +114,7 @@ impl ListedAlert {
         }
     }
 
-    /// Text of the action; empty if there is none or if the alert has ended.
+    /// Text of the action against the alert's problem; empty if there is none or if the alert has ended.
     pub fn advice(&self, around: &TextContext<'_>) -> String {
         if self.state != AlertState::Active {
             return String::new();
@@ -156,7 +156,7 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
     }
 }
 
-/// Puts the place first in a text about this chainage, m.
+/// Prepends the place to a text about this chainage, m.
 fn place_first(text: &str, x_m: f64) -> String {
     let place = station(x_m);
     let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();

@@ -69,8 +69,8 @@ fn position_is_doubtful_if_passes_are_uncertain_or_the_cable_is_distrusted() {
 
 const NOW: MonoNs = MonoNs(9_000_000_000);
 
-/// The run of a section without samples. It is raised at the event with this index, or at the update
-/// before that event.
+/// The run of a section without samples. It is raised at event number `event`, or, with `at_beat`, at the
+/// advice update before that event.
 fn run(event: usize, at_beat: bool) -> RunInput {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();
@@ -98,7 +98,8 @@ fn run(event: usize, at_beat: bool) -> RunInput {
     RunInput::of((event, at_beat), NOW, told.unwrap(), &sections).unwrap()
 }
 
-/// Inputs of a tick: a run, a command that acknowledges all alerts, and readings at ten events.
+/// Test inputs of a tick: one changed run, a command that acknowledges all alerts, and readings at ten
+/// events.
 struct Bench {
     alerter: Alerter,
     run: RunInput,
@@ -124,7 +125,7 @@ impl Bench {
         }
     }
 
-    /// Applies inputs up to the update before the event with this index, or the whole tick.
+    /// Applies the inputs up to the advice update before event number `beat`, or those of the whole tick.
     ///
     /// Returns the number of alerts raised, the number of those acknowledged, the number of commands
     /// without effect, and the last reading's time.

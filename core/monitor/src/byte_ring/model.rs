@@ -91,8 +91,8 @@ impl ByteConsumer for ModelConsumer {
     }
 }
 
-/// A reading end that claims that all bytes are present, so that a protocol doesn't wait for the whole
-/// packet.
+/// A reading end that claims that all bytes are present, so that the ring's protocol doesn't wait for the
+/// whole packet.
 ///
 /// Models of deliberately broken protocols use it. loom must detect that they fail.
 pub struct Hasty(pub ModelConsumer);
@@ -115,12 +115,12 @@ impl ByteConsumer for Hasty {
     }
 }
 
-/// Ring of the loop, built on the model.
+/// The packet ring of the loop, built on loom's model of a byte ring.
 pub fn packets(capacity: usize) -> (Port<ModelProducer>, ModelReader) {
     packets_by(capacity, |consumer| consumer)
 }
 
-/// Ring of the loop, built on the model with another reading end.
+/// The packet ring of the loop, built on the model, with a substituted reading end.
 pub fn packets_by<R: ByteConsumer>(
     capacity: usize,
     reading: impl FnOnce(ModelConsumer) -> R,
@@ -129,7 +129,7 @@ pub fn packets_by<R: ByteConsumer>(
     (Port::on(producer), ModelReader(PortReader::on(reading(consumer))))
 }
 
-/// Reading end of the loop's ring, built on the model.
+/// Reading end of the loop's packet ring, built on the model.
 pub struct ModelReader<R: ByteConsumer = ModelConsumer>(PortReader<R>);
 
 impl<R: ByteConsumer> ModelReader<R> {
@@ -142,7 +142,7 @@ impl<R: ByteConsumer> ModelReader<R> {
     }
 }
 
-/// Runs a model. Prints and returns its number of executions.
+/// Runs a loom model. Prints and returns its number of executions.
 pub fn explore(name: &str, preemptions: Option<usize>, model: impl Fn() + Sync + Send + 'static) -> usize {
     let executions = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
     let count = std::sync::Arc::clone(&executions);

@@ -14,15 +14,15 @@ const MOST_OF_TICK: usize = 256;
 /// Traffic statistics of the console.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ConsoleCounts {
-    /// Number of packets.
+    /// Number of packets from the console.
     pub packets: u64,
-    /// Number of packets that are not a command.
+    /// Number of console packets that are not a valid command.
     pub invalid: u64,
     /// Number of commands without effect: the alert doesn't exist, or needs no acknowledgement.
     pub without_effect: u64,
 }
 
-/// The console as a source.
+/// The console as a packet source.
 #[derive(Debug, Resource)]
 pub(crate) struct Console {
     pub(crate) source: SourceId,
@@ -56,7 +56,7 @@ impl Console {
         Self { source, counts: ConsoleCounts::default() }
     }
 
-    /// Adds a packet that comes before the event with this index.
+    /// Adds a console packet that comes before the event with this index.
     pub(crate) fn take(&mut self, packet: Packet<'_>, before: usize, commands: &mut Commands) {
         self.counts.packets += 1;
         match Command::parse(packet.bytes) {

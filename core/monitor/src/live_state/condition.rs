@@ -7,7 +7,7 @@ use headrace_fusion::NoFix;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::advice::Reason;
 
-/// Ratio of the speed to v_max above which the speed counts as over v_max.
+/// Ratio of the speed to v_max above which the condition is "over v_max".
 ///
 /// The margin covers the measurement error and the advice's own margin.
 const OVER: f64 = 1.02;
@@ -22,15 +22,17 @@ const TOO_FAST: f64 = 1.05;
 pub enum Condition {
     /// No sensor has delivered data.
     NoData,
-    /// No data has arrived for this long.
+    /// No data has arrived for this duration.
     Old(DurNs),
     /// There is no position, for this reason.
     NoPosition(NoFix),
-    /// No head is inside the tunnel, whose nearer end is at this chainage (m). The position is reliable.
+    /// No head is inside the tunnel, whose nearer end is at this chainage (m). The position itself is
+    /// reliable.
     Outside(f64),
     /// No profiling head delivers readings.
     NoSonar,
-    /// All wall here has the verdict pass, and the position is reliable: any speed is fine.
+    /// All wall that the heads see here has the verdict pass, and the position is reliable: any speed is
+    /// fine.
     Passed,
     /// The vehicle is going back to this chainage (m) too fast for coverage. From there it will pass a missed
     /// stretch again.
@@ -41,7 +43,7 @@ pub enum Condition {
     TooFast,
     /// The present turn misses the target although the speed is within v_max.
     TurnFails,
-    /// Samples placed now can't be judged.
+    /// Samples placed at present can't be judged, because the position is doubtful.
     CannotSay(PositionDoubt),
     /// The speed is slightly over v_max.
     Over,
@@ -51,7 +53,7 @@ pub enum Condition {
     Good,
 }
 
-/// Colour of a condition.
+/// Colour of the lamp for a condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Lamp {
@@ -64,7 +66,7 @@ pub enum Lamp {
 }
 
 impl Condition {
-    /// Word used in JSON.
+    /// Word used for the colour in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::NoData => "no_data",
@@ -100,12 +102,12 @@ impl Condition {
 }
 
 impl LiveState {
-    /// Whether the spacing T forecast at the present speed exceeds this limit, m, or is unbounded.
+    /// Whether the spacing T of samples forecast at the present speed exceeds this limit, m, or is unbounded.
     fn turn_exceeds(&self, limit_m: f64) -> bool {
         self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)
     }
 
-    /// Present condition.
+    /// Present condition. Conditions declared first in [`Condition`] take precedence.
     pub fn condition(&self) -> Condition {
         let Some(age) = self.age() else { return Condition::NoData };
         if self.is_old() {
@@ -126,7 +128,7 @@ impl LiveState {
         let going_back = self.back_to_m.filter(|_| self.position == PositionState::Ok);
         let Some(v_max_mps) = self.v_max_mps() else {
             return match advice.reason {
-                // A head that isn't turning, or hasn't turned for long enough yet, gives no evidence.
+                // A head that isn't turning, or has only just begun to turn, counts as delivering no sonar data.
                 Reason::NoReturns => Condition::NoSonar,
                 Reason::NoHeadingOrFix => Condition::NoPosition(NoFix::Heading),
                 Reason::AngularStep | Reason::HelixPitch => {
@@ -140,7 +142,8 @@ impl LiveState {
         }
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
-            // `will_exceed` stays set for a second. The present turn may already be better.
+            // `will_exceed` stays set for a second, although the forecast for the present turn may be within
+            // the target again.
             _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => {
                 Condition::TurnFails
             }

@@ -27,7 +27,7 @@ pub struct LiveStateJson {
     pub condition: &'static str,
     /// Colour of the condition.
     pub lamp: Lamp,
-    /// The position.
+    /// Position of the vehicle, with its state.
     pub position: PositionJson,
     /// Speed along the tunnel, positive inwards, m/s; `None` without a position.
     pub speed_mps: Option<f64>,
@@ -35,7 +35,8 @@ pub struct LiveStateJson {
     pub v_max_mps: Option<f64>,
     /// Reason that limits the speed; `None` before the first advice.
     pub reason: Option<&'static str>,
-    /// Margins of speed and turn, part of the target that position errors take, and share of lost returns.
+    /// Margins of speed and turn, the part of the target that position errors use up, and the share of lost
+    /// returns.
     pub margins: MarginsJson,
     /// Forecast of the present turn.
     pub turn: Option<TurnJson>,
@@ -62,18 +63,18 @@ pub struct LiveStateJson {
 pub struct PositionJson {
     /// `ok`, `doubtful` or `none`.
     pub state: &'static str,
-    /// Reason for the state.
+    /// Reason for which the position is doubtful or missing.
     ///
     /// A doubtful position has `cable` or `spread`. A missing one has `no_heading`, `no_chainage` or
     /// `no_place_in_section`.
     pub why: Option<&'static str>,
-    /// Chainage, m.
+    /// Chainage of the vehicle, m.
     pub chainage_m: Option<f64>,
-    /// Chainage as stationing.
+    /// Chainage of the vehicle as stationing.
     pub station: Option<String>,
-    /// Standard deviation of chainage, m.
+    /// Standard deviation of the chainage, m.
     pub chainage_sd_m: Option<f64>,
-    /// Standard deviation of the place in the cross-section, m.
+    /// Standard deviation of the vehicle's place in the cross-section, m.
     pub place_sd_m: Option<f64>,
     /// Standard deviation of yaw, degrees.
     pub yaw_sd_deg: Option<f64>,
@@ -83,7 +84,8 @@ pub struct PositionJson {
     pub stand_s: u32,
 }
 
-/// Margins of speed and turn, part of the target that position errors take, and share of lost returns.
+/// Margins of speed and turn, the part of the target that position errors use up, and the share of lost
+/// returns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MarginsJson {
     /// v_max minus the present speed, m/s; negative if the speed is too fast.
@@ -115,12 +117,12 @@ pub struct TurnJson {
     pub phase_error_deg: Option<f64>,
 }
 
-/// A sensor.
+/// State of a sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorJson {
-    /// Id.
+    /// Id of the sensor.
     pub id: String,
-    /// State.
+    /// State of the sensor, as a word.
     pub state: SensorState,
     /// Age of the sensor's last reading, seconds; `None` if there is none.
     pub age_s: Option<f64>,
@@ -138,21 +140,20 @@ pub struct MetresJson {
     pub way_m: f64,
 }
 
-/// A stretch.
+/// A stretch without a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StretchJson {
-    /// Reason: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`,
-    /// `contradicted_profile`, `other_size` or `no_wall`.
+    /// Reason for the missing verdict: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`,
+    /// `distrusted_head`, `contradicted_profile`, `other_size` or `no_wall`.
     pub why: &'static str,
-    /// Beginning, m.
+    /// Beginning of the stretch, m.
     pub from_m: f64,
-    /// End, m.
+    /// End of the stretch, m.
     pub to_m: f64,
 }
 
 impl LiveState {
-    /// The state in JSON, with the alerts of the same dive. See
-    /// [`DiveView::live_state_json`](crate::view::DiveView::live_state_json).
+    /// The live state as JSON, with the alerts of the same dive.
     pub fn json(&self, around: &TextContext<'_>, alerts: &AlertList) -> LiveStateJson {
         let TextContext { sources, section_m, .. } = *around;
         let (shown, alerts_hidden) = alerts.shown();

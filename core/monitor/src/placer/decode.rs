@@ -13,7 +13,7 @@ use crate::messages::Event;
 #[derive(Debug, Default, Resource)]
 pub(super) struct Events(pub(super) Vec<Event>);
 
-/// The operator's input.
+/// The operator's input, as a source of commands.
 #[derive(SystemParam)]
 pub(super) struct Operator<'w> {
     console: ResMut<'w, Console>,

@@ -19,7 +19,7 @@ use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// A head: number, mount, measured motion, losses and occluded angles.
+/// Query for a head: number, mount, measured motion, losses and occluded angles.
 type Heads<'w, 's> = Query<'w, 's, HeadParts>;
 type HeadParts = (
     &'static Head,
@@ -106,7 +106,7 @@ fn place(
     ping
 }
 
-/// Counts a ping that was aimed at wall within range.
+/// Counts a ping that was aimed at wall within range, for the head's loss statistics.
 fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel: &TunnelDesign) {
     match ping.outcome {
         Outcome::Sample { point, arc_m } => {
@@ -123,7 +123,8 @@ fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel
     }
 }
 
-/// Margin on either side of the occluded angles, radians. Within it, the vehicle may also return echoes.
+/// Margin on either side of the occluded angles, radians. Beams within it may also return echoes from the
+/// vehicle.
 const BESIDE_RAD: f64 = 0.09;
 /// A return at an occluded angle is from the vehicle if its range is below this share of the range to the
 /// wall.
@@ -168,7 +169,7 @@ fn outcome(
     Outcome::Lost(loss, aim)
 }
 
-/// Longest range at the head's range setting in this water, m.
+/// Longest range at the head's range setting, corrected for the speed of sound in this water, m.
 fn longest_m(sonar: &SonarReturn, tunnel: &TunnelDesign) -> f64 {
     tunnel.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps)
 }
@@ -267,7 +268,7 @@ mod tests {
             );
             assert!(matches!(heard(Some(range_m), false), Outcome::Sample { .. }), "{range_m}");
         }
-        // A return from more than half the distance of the wall is not from the vehicle.
+        // A return from more than half the wall's distance is not from the vehicle.
         assert!(matches!(heard(Some(1.6), true), Outcome::Sample { .. }));
         assert!(matches!(heard(None, true), Outcome::Lost(Loss::Occluded, Some(_))));
         assert!(matches!(heard(None, false), Outcome::Lost(Loss::Missing, Some(_))));
@@ -279,8 +280,7 @@ mod tests {
     fn head_angles_are_extrapolated_to_the_update() {
         const RATE_RADPS: f64 = 0.785;
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
-        // Each head makes 400 pings in 8 s. The first number is its first ping's time, the second its turn
-        // rate.
+        // For each head, which makes 400 pings in 8 s: time of its first ping, and turn rate.
         let heads = [(1.0, RATE_RADPS), (3.0, -RATE_RADPS), (0.5, RATE_RADPS)];
         let mut world = World::new();
         for (number, (from_s, rate_radps)) in heads.into_iter().enumerate() {

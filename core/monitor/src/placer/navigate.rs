@@ -14,12 +14,12 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::Reading;
 
-/// A multiple of [`ADVICE_PERIOD`], or a sonar ping, with its fix.
+/// A sonar ping, or an advice update at a multiple of [`ADVICE_PERIOD`], with its fix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Positioned {
     /// A sonar ping. The fix is for the ping's time of validity.
     Ping { event: usize, sensor: Entity, fix: Result<Fix, NoFix> },
-    /// A multiple of the advice period has passed. `before` is the index of the next event.
+    /// An advice update at a multiple of the advice period. `before` is the index of the next event.
     Beat { at: MonoNs, fix: Result<Fix, NoFix>, doubts: Doubts, sd: Option<PoseSd>, before: usize },
 }
 
@@ -27,7 +27,7 @@ pub(super) enum Positioned {
 #[derive(Debug, Resource)]
 pub(super) struct PositionedList(pub(super) Vec<Positioned>);
 
-/// Poses at the updates.
+/// Result stream of the vehicle's poses at the updates.
 #[derive(Debug, Default, Resource)]
 pub(crate) struct Poses(pub(crate) ResultStream);
 

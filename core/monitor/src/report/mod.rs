@@ -83,13 +83,13 @@ pub struct Report {
     pub notes: Vec<NoteJson>,
     /// Number of notes left out for lack of room.
     pub notes_dropped: u32,
-    /// Traffic of the operator's input; `None` without any.
+    /// Traffic statistics of the operator's input; `None` without any input.
     pub console: Option<ConsoleReport>,
     /// Advice history.
     pub advice: Vec<AdviceReport>,
     /// Number of advice entries dropped for lack of room.
     pub advice_dropped: u64,
-    /// Traffic of each source.
+    /// Traffic statistics of each source.
     pub sources: Vec<SourceReport>,
     /// Effect of smoothing on the verdicts; `None` without smoothing.
     pub smoothing: Option<SmoothingReport>,
@@ -104,9 +104,9 @@ pub struct LogReport {
     pub sha256: String,
     /// Number of messages from sources.
     pub messages: u64,
-    /// Losses in plain text. Each text has the time span of the loss.
+    /// Losses of logged data, in plain text. Each text has the time span of the loss.
     pub losses: Vec<String>,
-    /// Irregularities and how they were handled, in plain text. They lost no data.
+    /// Irregularities in the log that lost no data, and how they were handled, in plain text.
     pub notes: Vec<String>,
     /// Files of a recording in parts, in order.
     pub parts: Vec<PartReport>,
@@ -115,11 +115,11 @@ pub struct LogReport {
 /// A part of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct PartReport {
-    /// Path.
+    /// Path of the file.
     pub path: String,
-    /// SHA-256, hexadecimal.
+    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Number of messages from sources.
+    /// Number of messages from sources in the file.
     pub messages: u64,
 }
 
@@ -142,15 +142,15 @@ pub struct DiveReport {
     pub sound_speed_least_mps: f64,
     /// Maximum speed of sound used for ranges, m/s.
     pub sound_speed_most_mps: f64,
-    /// Samples on the wall.
+    /// Number of samples on the wall.
     pub samples_valid: u64,
-    /// Valid samples dropped because their cells were full.
+    /// Number of valid samples dropped because their cells of the sample store were full.
     pub samples_thinned: u64,
-    /// Pings without a sample, by reason.
+    /// Number of pings without a sample, by reason.
     pub samples_rejected: RejectedReport,
 }
 
-/// Pings that gave no sample.
+/// Numbers of pings that gave no sample, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct RejectedReport {
     /// No return although the wall was within range.
@@ -169,41 +169,41 @@ pub struct RejectedReport {
     pub doubtful_returns: u64,
 }
 
-/// Metres by verdict, and spacings.
+/// Metres by verdict, and spacings of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SummaryReport {
     /// Metres of sections that passed.
     pub pass_m: f64,
-    /// Metres that failed.
+    /// Metres of sections that failed.
     pub fail_m: f64,
-    /// Metres undecided within the error of the hole.
+    /// Metres of sections undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// Metres still open.
+    /// Metres of sections still open.
     pub open_m: f64,
-    /// Metres where some heads have not been, because the vehicle began or turned back there.
+    /// Metres of sections where some heads have not been, because the vehicle began or turned back there.
     pub not_inspected_m: f64,
-    /// Number of fails that were flagged.
+    /// Number of failed sections that were flagged.
     pub flags_raised: u32,
     /// Number of flags that a later pass cleared.
     pub flags_cleared: u32,
-    /// Distance between passes.
+    /// Distance along the tunnel between passes of heads over the same arc length.
     pub t_x: SpreadReport,
-    /// Distance between neighbours of one sweep.
+    /// Distance between neighbouring samples of one sweep.
     pub t_y: SpreadReport,
-    /// Lattice diagonal.
+    /// Diagonal of the lattice formed by neighbouring samples of neighbouring passes.
     pub t: SpreadReport,
-    /// Holes of the sections.
+    /// Diameter of the largest hole in each section.
     pub hole: SpreadReport,
 }
 
 /// A declared opening of the wall.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OpeningReport {
-    /// Display name.
+    /// Display name of the opening.
     pub name: String,
-    /// Beginning, m.
+    /// Beginning of the opening, m.
     pub from_m: f64,
-    /// End, m.
+    /// End of the opening, m.
     pub to_m: f64,
     /// Arc length at which the opening begins, m; `None` for the whole perimeter.
     pub arc_from_m: Option<f64>,
@@ -211,12 +211,12 @@ pub struct OpeningReport {
     pub arc_length_m: Option<f64>,
 }
 
-/// Traffic of the operator's input.
+/// Traffic statistics of the operator's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct ConsoleReport {
-    /// Number of packets.
+    /// Number of packets from the operator's input.
     pub packets: u64,
-    /// Number of packets that are not a command.
+    /// Number of packets that are not a valid command.
     pub invalid: u64,
     /// Number of commands without effect.
     pub without_effect: u64,
@@ -279,7 +279,7 @@ impl Report {
         }
     }
 
-    /// Whether any received data were lost before they gave results.
+    /// Whether any received data were lost before they were used.
     pub fn lost_data(&self) -> bool {
         let rejected = &self.dive.samples_rejected;
         let dropped =
@@ -295,7 +295,7 @@ impl SummaryReport {
     }
 }
 
-/// Alerts that the list still keeps, as of the end of the dive.
+/// Alerts that the list still holds, in their state at the end of the dive.
 fn listed(dive: &Loop) -> Vec<ListedAlertJson> {
     let around = dive.view().surroundings();
     let now = dive.view().span().map_or(MonoNs(0), |(_, last)| last);
@@ -307,7 +307,7 @@ fn console_report(counts: ConsoleCounts) -> Option<ConsoleReport> {
     (packets > 0).then_some(ConsoleReport { packets, invalid, without_effect })
 }
 
-/// Confidence as a whole number, like the setting.
+/// Confidence as a whole number, as in the setting.
 fn confidence(confidence_sd: f64) -> u32 {
     u32::try_from(headrace_geometry::math::round_to_i64(confidence_sd)).unwrap_or(0)
 }

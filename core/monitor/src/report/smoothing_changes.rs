@@ -1,11 +1,11 @@
-//! Compares the report of a smoothed dive with the report of the same dive by the filter alone.
+//! Compares the report of a smoothed dive with the report of the same dive by the navigation filter alone.
 
 use super::smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 use super::{Report, SummaryReport};
 use crate::section_row::SectionRow;
 
-/// Compares the filter's report with the report after smoothing `estimates` estimates in `pieces` contiguous
-/// pieces.
+/// Compares the report by the navigation filter with the report after smoothing. The smoothed trajectory has
+/// `estimates` state estimates in `pieces` contiguous pieces.
 pub fn compare(filter: &Report, smoothed: &Report, estimates: u64, pieces: u64) -> SmoothingReport {
     SmoothingReport {
         filter_digest: filter.digest.clone(),
@@ -27,7 +27,7 @@ fn judged(section: &SectionRow) -> JudgedReport {
     JudgedReport { verdict: verdict.as_str(), hole_m, hole_sd_m }
 }
 
-/// Lists the sections whose verdict differs.
+/// Lists the sections whose verdict differs between two reports.
 ///
 /// Both inputs are in the order of chainage. Either may have sections that are missing in the other.
 fn changes(before: &[SectionRow], after: &[SectionRow]) -> Vec<ChangeReport> {

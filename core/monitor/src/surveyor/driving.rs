@@ -17,7 +17,7 @@ use headrace_sampling::margin::position_margin_m;
 use headrace_sampling::passes::{Passes, Phasing, Situation};
 use headrace_sampling::swing::Looks;
 
-/// Longest time between neighbouring passes for which the rotation of the vehicle is looked up, seconds.
+/// Longest time between neighbouring passes over which the rotation of the vehicle is computed, seconds.
 const LONGEST_S: f64 = 50.0;
 /// Relative change of the time between passes above which the fitting speed, the largest one that meets the
 /// target, is computed again.
@@ -25,7 +25,7 @@ const SAME_PASSES: f64 = 0.01;
 /// Search for the fitting speed: number of speeds tried, and ratio of each speed to the previous one.
 const SLOWER: u32 = 80;
 const SLOWER_BY: f64 = 0.97;
-/// Number of beams round a place for which the steps along the wall are computed.
+/// Number of beams in a turn for which the steps along the wall are computed.
 const RAYS: u32 = 72;
 /// Movement across the tunnel after which the steps along the wall are computed again, m.
 const MOVED_M: f64 = 0.05;
@@ -47,11 +47,11 @@ pub(super) struct Plan {
     pub(super) target_m: f64,
     /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
     pub(super) confidence_sd: f64,
-    /// Effect of other head settings.
+    /// Predicted effect of alternative head settings.
     pub(super) other: OtherSettings,
 }
 
-/// Driving figures at the last update, and the earlier data needed for them.
+/// Driving figures at the last update, and the data kept to compute the next ones.
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Driving {
     pub(super) now: Drive,
@@ -66,7 +66,7 @@ pub(crate) struct Driving {
     steps_m: [f64; WAITS],
     /// Inputs for which the fitting speed was last computed.
     ///
-    /// They are the time between passes, seconds, the steps along the wall, m, and the target minus its
+    /// The inputs are the time between passes, seconds, the steps along the wall, m, and the target minus its
     /// margin, m.
     fitted: [f64; 3],
     looks: Looks,
@@ -76,8 +76,8 @@ pub(crate) struct Driving {
 stateful!(Driving { state: now, step_rad, place_m, steps_m, fitted, looks, lacking; });
 
 impl Driving {
-    /// Updates the figures from the present situation, and from the same situation with no head silent or
-    /// stalled.
+    /// Updates the driving figures from the present situation, and from the same situation with no head
+    /// silent or stalled.
     ///
     /// Allocates: never.
     pub(super) fn note(
@@ -145,7 +145,8 @@ impl Driving {
         };
     }
 
-    /// Updates the largest steps along the wall if the vehicle or its heads' steps have changed enough.
+    /// Updates the largest steps along the wall if the vehicle's place or the heads' angular step has changed
+    /// enough.
     fn note_steps(&mut self, situation: &Situation, place_m: Yz, profile: &Profile) {
         let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
         if step_rad <= 0.0 {
@@ -190,7 +191,7 @@ impl Driving {
         let healthy_at_plan_s = gap_s(&phasing.at(plan_mps));
         let all_turn = turning == situation.configured && self.lacking.all_turn(at);
         // At a speed other than the planned one, the evenness of passes doesn't show whether the heads are in
-        // phase. The times at the planned speed are therefore compared.
+        // phase. Therefore the times between passes at the planned speed are compared.
         if all_turn && gap_at_plan_s <= IN_STEP * gap_s(&scheduled_at_plan).min(healthy_at_plan_s) {
             self.lacking.stalled = HeadSet::default();
         }
@@ -238,7 +239,7 @@ fn steps_by_wait_m(profile: &Profile, place_m: Yz, step_rad: f64, sectors: usize
     steps_m
 }
 
-/// Largest distance along the hull between turning heads, m.
+/// Distance along the hull between the foremost and the rearmost turning head, m.
 fn apart_m(situation: &Situation) -> f64 {
     let x_m = || situation.heads.iter().flatten().map(|motion| motion.mount.position.x());
     (x_m().fold(f64::NEG_INFINITY, f64::max) - x_m().fold(f64::INFINITY, f64::min)).max(0.0)
@@ -254,7 +255,8 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * math::TAU / 360.0;
 
-    /// Four heads side by side that turn in 8 s, at these angles, on a vehicle in the centre of a pipe.
+    /// Situation of four heads side by side that turn in 8 s, with these angles, on a vehicle in the centre
+    /// of a pipe.
     fn situation(angles_deg: [f64; 4], speed_mps: f64, profile: &Profile) -> Situation {
         let mut heads = [None; MAX_HEADS];
         for (slot, angle_deg) in heads.iter_mut().zip(angles_deg) {
@@ -290,15 +292,15 @@ mod tests {
         driving.now
     }
 
-    /// Four heads are a quarter of a turn apart and turn in 8 s. Without one of them, the longest gap is half
-    /// a turn.
+    /// Four heads are a quarter of a turn apart and turn in 8 s. Without one of them, the longest gap between
+    /// the others is half a turn.
     #[test]
     fn stalled_head_counts_as_stalled_until_it_is_back_in_phase() {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
         driving.lacking.stalled = HeadSet::default().with(1);
-        // The head is a sixteenth of a turn late.
+        // The restored head is a sixteenth of a turn late.
         let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
         assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
         assert!(near(late.even_gap_s, 2.0), "if they were evenly spread");
@@ -331,7 +333,7 @@ mod tests {
         let most_mps = along_m / 2.02;
         let fits_mps = |planned_mps: f64| {
             let mut driving = Driving::default();
-            // The steps are known only after the first update.
+            // The steps along the wall are known only after the first update.
             noted(&mut driving, EVEN, -0.1, planned_mps);
             let now = noted(&mut driving, EVEN, -0.1, planned_mps);
             assert!((now.fits_along_m - along_m).abs() < 1e-6 && (now.speed_mps - 0.1).abs() < 1e-12);
@@ -363,7 +365,8 @@ mod tests {
             near(all[0], 4.0) && all[1..].iter().all(|step| step.abs() <= 0.0),
             "all waits must be equal: {all:?}"
         );
-        // Two sectors end at the floor and at the ceiling. The middle quarter of each is at a side.
+        // Two sectors end at the floor and at the ceiling. The middle quarter of each sector is at a side of
+        // the pipe.
         let below = of([0.0, -1.0], 2);
         assert!(near(below[0], 4.0) && (3.0..3.5).contains(&below[3]), "{below:?}");
         assert!(below.windows(2).all(|pair| pair[0] > pair[1]), "decreasing from the ceiling on: {below:?}");

@@ -67,7 +67,7 @@ fn judge_one(
     }
 }
 
-/// Records changed runs for the list of alerts.
+/// Records changed runs of flagged sections for the list of alerts.
 ///
 /// Cleared runs come last. The runs that remain of a cleared run take over its alert, so the list must have
 /// these runs first.
@@ -106,7 +106,7 @@ mod tests {
 
     const AT: MonoNs = MonoNs(7_000_000_000);
 
-    /// Judges a section without samples, 20 m from the places where samples may still land.
+    /// Judges a test section without samples that lies 20 m from the places where samples may still land.
     ///
     /// Up to chainage `not_passed_m`, m, some heads have not been in the tunnel.
     fn judged(coverage: &mut Coverage, section: i64, not_passed_m: f64) -> (Vec<Notice>, Vec<RunInput>) {
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!((notices, coverage.unsure), (vec![run, section], None));
         let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_beat, run.at));
         assert_eq!(found.collect::<Vec<_>>(), [(RunId(0), RunChange::Raised, 3, true, AT)]);
-        // There is no verdict if some heads have not been in the section. Neighbouring sections without a
+        // A section gets no verdict if some heads have not been in it. Neighbouring sections without a
         // verdict form one stretch, and a distant section forms another.
         for (section, from, to, sections) in [(20, 20, 21, 1), (21, 20, 22, 2), (60, 60, 61, 1)] {
             let (notices, runs) = judged(&mut coverage, section, 20.0);

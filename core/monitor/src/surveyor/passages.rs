@@ -1,4 +1,4 @@
-//! Notes how the vehicle and its heads pass each section.
+//! Records how the vehicle and its heads pass each section.
 
 use crate::entities::HeadFrontier;
 use crate::messages::{Outcome, PlacedPing};
@@ -6,11 +6,11 @@ use crate::resources::Coverage;
 use headrace_coverage::{Drive, HeadReach, Loss, PassError, Visit};
 use headrace_geometry::tunnel::Profile;
 
-/// Limit for using a ping's speed as evidence. The ping isn't used if this many standard deviations of its
-/// position error relative to the previous pass reach the target.
+/// Limit for using the speed at a ping as evidence of a cause. The speed isn't used if this many standard
+/// deviations of its position error relative to the previous pass reach the target.
 const ADRIFT_SD: f64 = 2.0;
 
-/// Adds a ping to the passage of the section that the ping's head is in.
+/// Adds a ping to the passage record of the section that the ping's head is in.
 pub(super) fn note_passage(
     coverage: &mut Coverage,
     frontier: &HeadFrontier,
@@ -97,8 +97,8 @@ mod tests {
         assert_eq!(coverage.sections.get(28).unwrap().passage, elsewhere);
     }
 
-    /// A ping is no evidence of the speed if two standard deviations against the previous pass reach the
-    /// target. The error of a hole is 1.2 times that of a pass.
+    /// A ping is no evidence of the speed if two standard deviations of its position relative to the previous
+    /// pass reach the target. The error of a hole is 1.2 times that of a pass.
     #[test]
     fn ping_with_an_uncertain_position_is_no_evidence_of_the_speed() {
         let profile = pipe();

@@ -72,7 +72,8 @@ mod tests {
     use super::*;
     use crate::fixtures::{coverage, heard, pinged, tunnel};
 
-    /// Pings at intervals of a tenth of a radian: 0.3 m along the wall, and a centimetre along the tunnel.
+    /// Test pings at intervals of a tenth of a radian: 0.3 m along the wall, and a centimetre along the
+    /// tunnel.
     fn at(step: u32) -> PlacedPing {
         let step = f64::from(step);
         heard(5.05 + 0.01 * step, 0.1 * step, 3.0)
@@ -104,14 +105,15 @@ mod tests {
         let (samples, steps, t_y_m, passes) = note(&at(3));
         assert_eq!((samples, steps, passes), (3, 2, [true, false, false, false]));
         assert!((t_y_m - math::hypot(6.0 * math::sin(0.1), 0.02)).abs() < 1e-9, "{t_y_m}");
-        // A step that isn't single, then the first sample of a new sweep, which has no previous sample.
+        // The first sample ends a step that isn't single. The second one begins a new sweep, so it has no
+        // previous sample.
         let (samples, steps, _, passes) = note(&PlacedPing { single_step: false, ..at(4) });
         assert_eq!((samples, steps, passes), (4, 3, [true, false, false, false]));
         let (samples, steps, ..) = note(&PlacedPing { new_sweep: true, ..at(5) });
         assert_eq!((samples, steps), (5, 3));
     }
 
-    /// The sample comes a turn later, 0.2 m further on, half way between two samples of the first turn.
+    /// The new sample comes a turn later, 0.2 m further on, half way between two samples of the first turn.
     #[test]
     fn distance_to_the_previous_pass_is_along_the_tunnel() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
@@ -119,7 +121,8 @@ mod tests {
             note_sample(&mut coverage, &mut sweep, &tunnel, &ping).unwrap();
         }
         let section = coverage.sections.get(20).unwrap();
-        // There, the first turn's pass was at 5.055 m. Each sample of that turn ends a step.
+        // At the new sample's arc length, the first turn's pass was at 5.055 m. Each sample of that turn ends
+        // a step.
         assert!((section.t_x_m.max - 0.18).abs() < 1e-9, "{:?}", section.t_x_m);
         assert_eq!((section.samples, section.t_y_m.count), (4, 2));
     }

@@ -1,4 +1,5 @@
-//! Walks over the placed items of a tick, up to the next stop.
+//! Processes the placed pings and updates of a tick, up to the next stop: an update, or a ping that makes
+//! sections due for judging.
 
 use bevy_ecs::prelude::Res;
 use bevy_ecs::system::SystemParam;
@@ -21,7 +22,7 @@ pub(super) struct Site<'w> {
     entities: Res<'w, HeadEntities>,
 }
 
-/// Processes items until sections are due for judging, or until an update.
+/// Processes pings until sections are due for judging, or until an update has been processed.
 pub(super) fn walk(
     placed: Res<'_, PlacedTick>,
     classified: Res<'_, Classified>,

@@ -20,7 +20,7 @@ use headrace_geometry::frames::{Point3, Tunnel};
 /// Distance beyond either end of the tunnel from which samples are recorded as outside, m.
 const WELL_BEYOND_M: f64 = 1.0;
 
-/// Inputs and outputs, without the head.
+/// Inputs and outputs of processing classified returns, without the head.
 pub(super) struct WallContext<'a> {
     pub(super) coverage: &'a mut Coverage,
     pub(super) tunnel: &'a TunnelDesign,
@@ -67,7 +67,7 @@ pub(super) fn note_ping(
     Some(between_m)
 }
 
-/// Inputs and outputs at the end of a dive.
+/// Inputs and outputs of processing the waiting returns at the end of a dive.
 type End<'w, 's> = (
     Query<'w, 's, (&'static HeadClassifier, &'static mut HeadSweep)>,
     Res<'w, HeadEntities>,
@@ -97,7 +97,7 @@ pub(super) fn end_returns(world: &mut World) {
     }
 }
 
-/// Applies a waiting return that has been classified, and then the effects of the pings that followed it.
+/// Applies a waiting return that has been classified, and then the effects of the pings after it.
 fn settle(
     context: &mut WallContext<'_>,
     sweep: &mut HeadSweep,
@@ -140,7 +140,7 @@ fn store(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing
 }
 
 /// Counts a doubtful return. For holes and causes it is a missing return, aimed at the point where its beam
-/// meets the design.
+/// meets the design profile.
 fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing, is_distrusted: bool) {
     context.tally.doubtful += 1;
     digest(context.outputs.digests, ping, RecordKind::Doubtful);
@@ -162,7 +162,7 @@ fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedP
         }
     }
     let Some(Aim { x_m, arc_m }) = aim else { return };
-    // A doubtful echo from beside the vehicle's outline comes from the vehicle.
+    // A doubtful echo at an angle just beside the vehicle's outline comes from the vehicle.
     let cause = match ping.hidden {
         Hidden::No if is_distrusted => Cause::HeadSilent,
         Hidden::No => Cause::MissingReturns,
@@ -243,8 +243,8 @@ mod tests {
             }
         }
 
-        /// Classifies and applies a ping. Returns the number of samples and the number of doubtful returns so
-        /// far.
+        /// Classifies and applies a test ping. Returns the number of samples and the number of doubtful
+        /// returns so far.
         fn note(&mut self, ping: &PlacedPing) -> (u64, u64) {
             let class = classify(&mut self.head, ping, &self.tunnel, &mut self.relief);
             let outputs = OutputRefs {
@@ -266,13 +266,13 @@ mod tests {
 
     const STEP_RAD: f64 = 0.0157;
 
-    /// Return with this number in the turn, at this range, m. The wall is at 3 m.
+    /// Test ping with this number in the turn, and a return at this range, m. The wall is at 3 m.
     fn at(number: u32, range_m: f64) -> PlacedPing {
         heard(5.1, 1.0 + STEP_RAD * f64::from(number), range_m)
     }
 
-    /// An isolated echo in front of the wall waits for the next return. Then it counts as missing, for holes
-    /// and for causes.
+    /// An isolated echo in front of the wall waits for the next return. After that it counts as a missing
+    /// sample, for holes and for causes.
     #[test]
     fn isolated_echo_counts_as_a_missing_sample_at_the_aimed_wall_point() {
         for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {

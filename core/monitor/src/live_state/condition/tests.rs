@@ -8,13 +8,14 @@ const fn at(seconds: u64) -> MonoNs {
     MonoNs(seconds * 1_000_000_000)
 }
 
-/// Advice with this reason, largest speed and forecast spacing T.
+/// Test advice with this reason, largest speed and forecast spacing T.
 fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
     let none = fixtures::advice(&fixtures::situation(None));
     Advice { reason, v_max_mps, predicted_t_m: Some(t_m), will_exceed: t_m > 0.5, ..none }
 }
 
-/// Two heads and another sensor. Their last readings came at 10 s. The speed and its limit are 0.07 m/s.
+/// Live state with two heads and another sensor. Their last readings came at 10 s. The speed and its limit
+/// are 0.07 m/s.
 pub(crate) fn state() -> LiveState {
     let mut heard = LiveState::new(0.5, 2.0, 0b11, 3).heard;
     heard[..3].fill(Some(at(10)));
