@@ -35,7 +35,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All causes, with the causes that the pilot can change first.
+    /// All causes, beginning with those that the pilot can change.
     ///
     /// If two causes explain a hole equally well, the first in this order is named.
     pub const ALL: [Self; 12] = [
@@ -53,7 +53,7 @@ impl Cause {
         Self::Unknown,
     ];
 
-    /// Word used in reports and logs.
+    /// Word used for the cause in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::TooFast => "too_fast",
@@ -109,7 +109,7 @@ impl Causes {
         Self(self.0 & !other.0)
     }
 
-    /// The causes in either set.
+    /// The causes in either of two sets.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -130,7 +130,7 @@ impl Causes {
         self.0.count_ones()
     }
 
-    /// Whether the set is empty.
+    /// Whether the set contains no cause.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }

@@ -35,13 +35,13 @@ pub struct Evidence {
     pub all_pass_gap_s: f64,
     /// Share of pings without a return, including pings whose wall was out of range.
     pub missing_share: f64,
-    /// Share of pings occluded by the vehicle.
+    /// Share of pings at which the vehicle occluded the beam.
     pub occluded_share: f64,
-    /// Share of pings of a stalled head.
+    /// Share of pings that a stalled head made.
     pub standing_share: f64,
     /// Number of samples missing in the hole for any reason: the ping was lost, or was not made.
     pub lost_in_hole: u32,
-    /// Largest step along the perimeter between neighbouring samples of one turn, m.
+    /// Largest step along the perimeter between neighbouring samples of one turn of a head, m.
     pub t_y_m: f64,
     /// Largest step predicted for a level vehicle in the centre of the tunnel, m.
     pub middle_t_y_m: f64,
@@ -62,7 +62,7 @@ impl Evidence {
             && (0.0..=self.fits_mps).contains(&self.with_losses_mps)
     }
 
-    /// Returns causes and speed of the section, which its run counts.
+    /// Causes and required speed of the section, as its run counts them.
     pub fn failing(&self) -> Failing {
         Failing { causes: self.causes, again_mps: self.with_losses_mps }
     }

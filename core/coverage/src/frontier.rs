@@ -10,7 +10,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::SILENT_AFTER;
 
-/// Stretch of tunnel in which a head's samples currently land.
+/// Range of chainages in which a head's samples currently land.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reach {
     /// Least chainage, m.
@@ -19,7 +19,8 @@ pub struct Reach {
     pub to_m: f64,
 }
 
-/// Reach of one head: the stretch where its samples land now, and the stretch of all its samples so far.
+/// Reach of one head: the stretch where its samples land now, and the stretch that all its samples have
+/// covered so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
     /// Receive time of the head's last ping, with or without a fix; `None` before the first.
@@ -40,7 +41,7 @@ impl HeadReach {
         Self { heard: Some(now), latest: reach, swept: Some(swept) }
     }
 
-    /// Creates the reach of a silent head that would be at `reach` if it pinged.
+    /// Creates the reach of a silent head. Its samples would land at `reach` if it pinged.
     pub fn silent_at(before: Option<Self>, reach: Reach) -> Self {
         debug_assert!(reach.is_ordered(), "a reach begins before it ends: {reach:?}");
         before.map_or(Self { heard: None, latest: reach, swept: None }, |before| Self {
@@ -85,7 +86,7 @@ pub struct Frontier {
     ///
     /// The stretch is empty (`from_m` above `to_m`) until such a place exists.
     through: Option<Reach>,
-    /// Zone: index range of the sections within the reach of the awaited heads plus a margin.
+    /// Zone: index range of the sections within reach of the heads that sections wait for, plus a margin.
     zone: Option<Range<i64>>,
     /// Time of the zone's last change.
     zone_moved: Option<MonoNs>,
@@ -96,7 +97,7 @@ pub struct Frontier {
     /// Before the first ping, this is the time of the first update.
     woken: Option<MonoNs>,
     course: Option<Course>,
-    /// Number of course reversals.
+    /// Number of times that the vehicle has turned back.
     turns: u32,
 }
 
@@ -110,7 +111,7 @@ struct Course {
     heads: usize,
 }
 
-/// Hysteresis for a reversal of the course, m. Yaw and tether slack cause smaller reversals.
+/// Hysteresis for a reversal of the course, m. Yaw and tether slack cause smaller back-and-forth movements.
 const TURNED_M: f64 = 0.25;
 
 impl Course {
@@ -137,9 +138,9 @@ pub struct Outlook {
     pub at: MonoNs,
     /// Coverage extent: chainages where the vehicle and its heads, pinging or not, have been.
     pub way: Option<Reach>,
-    /// Stretch covered by every awaited head that has pinged; `None` if empty.
+    /// Stretch covered by every head that sections wait for and that has pinged; `None` if empty.
     pub swept_by_all: Option<Reach>,
-    /// No head is alive.
+    /// Whether no head is alive: none has pinged for a while.
     pub none_alive: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
@@ -158,9 +159,9 @@ pub struct Outlook {
 /// Change of the frontier by one ping or update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections that are newly behind the zone.
+    /// Sections that the zone has newly left behind.
     pub left_behind: Range<i64>,
-    /// Sections that are newly ahead of the zone, because the vehicle moves backwards.
+    /// Sections newly ahead of the zone, because the vehicle moves backwards.
     pub left_ahead: Range<i64>,
     /// Whether the coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
@@ -208,7 +209,8 @@ impl Frontier {
         self.zone.clone().filter(|_| over(self.woken) && over(self.zone_moved))
     }
 
-    /// Whether a head has been silent for so long that sections do not wait for it while others ping.
+    /// Whether a head has been silent for so long that sections do not wait for its samples while others
+    /// ping.
     pub fn is_silent(&self, head: Option<&HeadReach>, now: MonoNs) -> bool {
         match head.and_then(|head| head.heard) {
             Some(heard) => !is_within_silence(heard, now),
@@ -223,7 +225,7 @@ impl Frontier {
         self.woken.is_none_or(|woken| is_within_silence(woken, now))
     }
 
-    /// Returns the awaited heads: the live heads, whose samples may still land.
+    /// Returns the awaited heads: those whose samples may still land.
     ///
     /// All heads are awaited if none is alive, or while the live heads are not known yet.
     fn awaited(
@@ -373,7 +375,8 @@ impl Moved {
         self.left_behind.contains(&section) || self.left_ahead.contains(&section)
     }
 
-    /// Whether nothing has changed: no section left the zone or joined the coverage extent.
+    /// Whether nothing has changed since the last ping or update: no section left the zone or joined the
+    /// coverage extent.
     ///
     /// Also true if no head's place is known.
     pub fn is_nothing(&self) -> bool {
@@ -393,7 +396,7 @@ impl Reach {
         f64::midpoint(self.from_m, self.to_m)
     }
 
-    /// Returns the smallest stretch that covers both stretches.
+    /// Returns the smallest stretch that covers two stretches.
     #[must_use]
     pub fn with(self, other: Self) -> Self {
         Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
@@ -411,7 +414,7 @@ pub fn clear_of(to_come: Option<Reach>, x_m: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A frontier with its heads.
+    /// Test fixture: a frontier with its heads.
     #[derive(Default)]
     struct Fixture {
         frontier: Frontier,
@@ -476,7 +479,7 @@ mod tests {
     }
 
     impl Fixture {
-        /// Updates the frontier at `now_s`, seconds.
+        /// Updates the test frontier at `now_s`, seconds.
         ///
         /// The heads, alive or not, are half a metre before and behind the vehicle.
         fn beat(&mut self, now_s: u64, x_m: f64) -> Moved {

@@ -31,13 +31,13 @@ pub use hypothetical::WallChanges;
 
 /// Maximum search radius, m. Wall farther than this from every sample counts as wall that no head has swept.
 pub const FARTHEST_M: f64 = 12.0;
-/// Half diagonal below which a tile isn't halved, m.
+/// Half diagonal below which a tile isn't halved any further, m.
 ///
 /// The bound of such a tile is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
-/// Upper limit of the rounding error of a distance, m.
+/// Upper limit of the rounding error of a computed distance, m.
 const ROUNDING_M: f64 = 1e-9;
-/// Value of `owner` for a tile without a known sample.
+/// Value of `owner` for a tile whose nearest sample isn't known.
 const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 /// Rounding tolerance with which a corner's bound counts as proven, m.
 const PROVEN_M: f64 = 1e-11;
@@ -51,9 +51,9 @@ pub struct Hole {
     pub least_m: f64,
     /// Upper bound of D, m; infinite if the hole is not `bounded`.
     pub most_m: f64,
-    /// Chainage of the centre, m.
+    /// Chainage of the circle's centre, m.
     pub x_m: f64,
-    /// Arc length of the centre, m.
+    /// Arc length of the circle's centre, m.
     pub arc_m: f64,
     /// Whether there are samples around the hole.
     ///
@@ -73,7 +73,7 @@ impl Hole {
             && arc_m >= 0.0
     }
 
-    /// Whether two holes differ by less than a centimetre in every respect.
+    /// Whether two holes differ by less than a centimetre in size and place.
     pub fn is_like(&self, other: &Self) -> bool {
         const LITTLE_M: f64 = 0.01;
         let grown_m = (self.diameter_m - other.diameter_m).abs();
@@ -94,7 +94,7 @@ struct Tile {
     /// The searches for an empty circle of given size use it differently. They store the chainage and arc
     /// length of any nearby sample, with the chainage from the start of the section.
     owner: (f64, f64),
-    /// Upper bound of f in the tile, m.
+    /// Upper bound of f, the distance to the nearest sample, in the tile, m.
     bound_m: f64,
 }
 
@@ -103,7 +103,7 @@ struct Best {
     distance_m: f64,
     x_m: f64,
     arc_m: f64,
-    /// Largest bound of the dropped tiles, m.
+    /// Largest upper bound among the dropped tiles, m.
     dropped_m: f64,
 }
 
@@ -114,13 +114,13 @@ struct Beyond {
     arc_m: f64,
 }
 
-/// Search result near the centre of a tile.
+/// Result of searching for a sample near the centre of a tile.
 enum Near {
-    /// No empty circle has its centre in the tile: one sample is within the radius of all its points.
+    /// No empty circle has its centre in the tile: one sample is within the radius of all points of the tile.
     Settled,
-    /// The nearest sample, or an equally near one.
+    /// The sample nearest to the centre, or an equally near one.
     Sample(Nearest),
-    /// No sample within reach.
+    /// No sample within the search radius.
     Nothing,
 }
 
@@ -136,7 +136,7 @@ impl Near {
 }
 
 impl Tile {
-    /// Half diagonal, m.
+    /// Half diagonal of the tile, m.
     fn half_m(&self) -> f64 {
         math::sqrt(self.half_x_m * self.half_x_m + self.half_arc_m * self.half_arc_m)
     }
@@ -201,11 +201,11 @@ fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
     })
 }
 
-/// Finds the largest hole of a stretch of wall; searches share their working memory.
+/// Finds the largest hole of a stretch of wall. All searches share the working memory of this finder.
 #[derive(Debug)]
 pub struct HoleFinder {
     tolerance_m: f64,
-    /// Radius of the last hole, m: the first guess for the next search.
+    /// Radius of the last hole found, m: the first guess for the next search.
     last_m: f64,
     /// Radius of the largest circle for which the changed wall was last laid out, m.
     laid_m: f64,
@@ -273,8 +273,8 @@ impl HoleFinder {
     fn search(&mut self, length_m: f64, reach_m: f64) -> Result<Best, Beyond> {
         let mut best = Best { distance_m: 0.0, x_m: 0.0, arc_m: 0.0, dropped_m: 0.0 };
         self.tiles.clear();
-        // A good first guess saves most of the work. All tiles' centres are evaluated before any tile is divided, and
-        // the tile with the largest bound is divided first.
+        // A good first guess at the hole saves most of the work. All tiles' centres are evaluated before any
+        // tile is divided, and the tile with the largest bound is divided first.
         let mut within_m = reach_m;
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
             let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
@@ -317,7 +317,7 @@ impl HoleFinder {
                 if bound_m > reach_m {
                     return Err(Beyond { x_m, arc_m });
                 }
-                // The owner of the share is the nearest sample, except for rounding.
+                // The owner of the share is the nearest sample to the farthest corner, except for rounding.
                 best.take(bound_m, x_m, arc_m);
                 return Ok(true);
             };
@@ -356,7 +356,7 @@ impl HoleFinder {
 }
 
 impl Best {
-    /// Whether the point lies in a section of this length, within the search radius of a sample.
+    /// Whether a point lies in a section of this length, within the search radius of a sample.
     fn is_within(&self, length_m: f64) -> bool {
         let is_inside = (-ROUNDING_M..=length_m + ROUNDING_M).contains(&self.x_m);
         is_inside && (0.0..=FARTHEST_M + ROUNDING_M).contains(&self.distance_m)
@@ -380,7 +380,7 @@ fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Res
     Ok(Tile { owner, bound_m, ..tile })
 }
 
-/// Cell size for a search radius, m.
+/// Cell size that suits a search radius, m.
 fn cell_m(reach_m: f64) -> f64 {
     (reach_m / 3.0).clamp(0.05, 0.5)
 }

@@ -9,13 +9,13 @@ use headrace_geometry::tunnel::Profile;
 /// A declared opening of the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opening {
-    /// Display name.
+    /// Display name of the opening.
     pub name: String,
     /// Chainage of the opening's beginning, m.
     pub from_m: f64,
     /// Chainage of the opening's end, m.
     pub to_m: f64,
-    /// Arc length of the opening's beginning, and length along the perimeter, m.
+    /// Arc length at which the opening begins, and its length along the perimeter, m.
     ///
     /// `None` for the whole perimeter.
     pub arc_m: Option<(f64, f64)>,
@@ -32,7 +32,8 @@ impl Opening {
         self.arc_m.map_or((0.0, perimeter_m), |(from_m, length_m)| (from_m, length_m.min(perimeter_m)))
     }
 
-    /// Returns the numbers of intervals along the tunnel and the perimeter at a spacing.
+    /// Returns the numbers of intervals between filling samples along the tunnel and the perimeter, for a
+    /// given spacing.
     fn counts(&self, perimeter_m: f64, spacing_m: f64) -> (i64, i64) {
         let over = |length_m: f64| (-math::floor_to_i64(-length_m / spacing_m)).max(1);
         (over(self.to_m - self.from_m), over(self.arc(perimeter_m).1))
@@ -86,7 +87,7 @@ mod tests {
         Opening { name: "gate".to_owned(), from_m: 4.0, to_m: 6.0, arc_m: Some((17.0, 4.0)) }
     }
 
-    /// A wall with samples every half metre, except in the opening.
+    /// A test wall with samples every half metre, except in the opening.
     fn store(profile: &Profile, with_opening: bool) -> SampleStore {
         let layout = StoreLayout {
             perimeter_m: profile.perimeter_m(),

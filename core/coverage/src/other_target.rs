@@ -1,11 +1,11 @@
-//! Alternative targets: verdicts on the same holes for another target.
+//! Verdicts on the holes found in a dive for another target than the dive's own.
 
 use super::frontier::{Outlook, clear_of};
 use super::hole::Hole;
 use super::section::{Section, Verdict};
 use super::sections::{Sections, verdict};
 
-/// A section's hole, independent of the target.
+/// Inputs for the verdict on a section's hole that don't depend on the target.
 #[derive(Debug, Clone, Copy)]
 struct Measured {
     hole: Hole,
@@ -15,7 +15,7 @@ struct Measured {
 }
 
 impl Measured {
-    /// Figures of a section with a measured hole.
+    /// Inputs for the verdict on a section with a measured hole.
     fn of(section: &Section) -> Option<Self> {
         Some(Self { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.doubt().is_some() })
     }
@@ -58,7 +58,7 @@ mod tests {
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
-    /// A pipe with samples every 0.2 m, except from 5 m to 5.6 m.
+    /// Sections of a pipe with samples every 0.2 m, except from 5 m to 5.6 m.
     ///
     /// The coverage extent is 3 m to 7 m, judged in sections of a quarter of a metre.
     struct Seen {
@@ -118,7 +118,7 @@ mod tests {
         }
     }
 
-    /// The error is two standard deviations of 0.05 m.
+    /// The error of the hole is two standard deviations of 0.05 m.
     #[test]
     fn verdict_for_another_target_respects_position_error_and_doubtful_samples() {
         let mut seen = Seen::new();

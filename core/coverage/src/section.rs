@@ -12,7 +12,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 
-/// Coverage verdict of a section. Source: docs/why/coverage.md, "Verdicts".
+/// Coverage verdict on a section. Source: docs/why/coverage.md, "Verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
     /// Undecided: samples may still land, or some heads have not been in the section.
@@ -20,19 +20,19 @@ pub enum Verdict {
     /// Samples count only if they may land without the vehicle turning back.
     #[default]
     Open,
-    /// D + k sd <= T, where k is the confidence.
+    /// Pass: D + k sd <= T, for hole diameter D, target T and confidence k.
     Pass,
-    /// D - k sd > T.
+    /// Fail: D - k sd > T.
     Fail,
-    /// Neither condition holds within the error of D.
+    /// Can't say: neither condition holds within the error of D.
     CannotSay,
 }
 
 impl Verdict {
-    /// All verdicts.
+    /// All verdicts, in order.
     pub const ALL: [Self; 4] = [Self::Open, Self::Pass, Self::Fail, Self::CannotSay];
 
-    /// Word used in reports and logs.
+    /// Word used for the verdict in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Open => "open",
@@ -64,7 +64,7 @@ impl Default for Spread {
 }
 
 impl Spread {
-    /// Adds a value.
+    /// Adds a value to the statistics.
     pub fn add(&mut self, value: f64) {
         self.merge(&Self { count: 1, min: value, max: value, mean: value, scatter: 0.0 });
     }
@@ -101,26 +101,26 @@ impl Spread {
 /// Change made by judging a section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Judgement {
-    /// The verdict or the hole has a new value.
+    /// The section's verdict or hole has a new value.
     Updated,
-    /// A flag was raised.
+    /// The section was flagged as missed.
     Raised,
-    /// A flag was cleared.
+    /// The section's flag was cleared.
     Cleared,
 }
 
 impl Judgement {
-    /// All changes.
+    /// All changes that judging can make.
     pub const ALL: [Self; 3] = [Self::Updated, Self::Raised, Self::Cleared];
 }
 
-/// One section.
+/// One section of the tunnel.
 #[expect(clippy::struct_excessive_bools, reason = "the flags are independent of one another")]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
-    /// Current verdict.
+    /// Current verdict on the section.
     pub verdict: Verdict,
-    /// Hole as last measured.
+    /// Largest hole of the section as last measured.
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
@@ -133,11 +133,11 @@ pub struct Section {
     pub not_inspected: bool,
     /// Time at which the fail was flagged.
     pub flagged: Option<MonoNs>,
-    /// Time at which a later pass filled the hole.
+    /// Time at which a later pass filled the hole of the flagged section.
     pub cleared: Option<MonoNs>,
-    /// Causes of the fail.
+    /// Evidence for the causes of the fail.
     pub evidence: Option<Evidence>,
-    /// Whether the causes were determined while the heads had left only a part of the section.
+    /// Whether the causes were determined when the heads had passed only a part of the section.
     pub(super) explained_in_part: bool,
     /// Ping statistics of the passage through the section.
     pub passage: Passage,
@@ -159,9 +159,9 @@ pub struct Section {
     pub doubtful: u32,
     /// Whether the section holds samples of a head that was distrusted soon after.
     pub suspect: bool,
-    /// Number of the visit that was the newest one when this head became distrusted.
+    /// Number of the newest visit at the time when this head became distrusted.
     suspected_in: u32,
-    /// Visits with samples within the target T of the section.
+    /// Visits of the vehicle with samples within the target T of the section.
     pub(super) visits: Visits,
     /// Number of the visit that the pass error in `passage` belongs to.
     passed_in: u32,
@@ -203,7 +203,7 @@ impl Section {
         self.samples >= FEW && self.deviation.contradicts()
     }
 
-    /// Records the error between passes at a ping with a fix in the section.
+    /// Records the error between passes at a ping that has a fix in the section.
     pub fn note_pass(&mut self, visit: &Visit, profile: &Profile) {
         if self.passed_in != visit.number {
             self.visits.note_earlier(self.passage.pass_error.worst_m(profile));
@@ -218,7 +218,7 @@ impl Section {
         self.visits.are_several() && !(self.suspect && self.visits.newest() <= self.suspected_in)
     }
 
-    /// Discards the samples of all visits except the newest.
+    /// Discards the section's samples of all visits except the newest.
     pub(super) fn keep_newest_visit(&mut self) {
         self.visits.keep_newest();
         self.suspect = false;
@@ -290,13 +290,13 @@ impl Section {
 /// Metres of tunnel by verdict. Each metre is counted once.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Metres {
-    /// Metres that pass.
+    /// Metres that have passed.
     pub pass_m: f64,
     /// Metres that fail.
     pub fail_m: f64,
     /// Metres undecided within the error of D.
     pub cannot_say_m: f64,
-    /// Metres that further driving may still fill.
+    /// Metres still open: further driving may fill their holes.
     pub open_m: f64,
     /// Metres at the ends of the coverage extent where some heads have not been.
     ///
@@ -305,7 +305,7 @@ pub struct Metres {
 }
 
 impl Metres {
-    /// Adds metres with a verdict.
+    /// Adds metres of tunnel with a verdict.
     pub fn add(&mut self, verdict: Verdict, metres_m: f64) {
         *match verdict {
             Verdict::Pass => &mut self.pass_m,

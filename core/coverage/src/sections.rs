@@ -63,7 +63,7 @@ impl Ended {
 pub const CONFIDENCE_SD: f64 = 2.0;
 
 impl Request {
-    /// Returns a function that makes a request for a section, with the outlook's time and stretches.
+    /// Returns a function that makes a request to judge a section, with the outlook's time and stretches.
     pub fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
         let Outlook { at, swept_by_all, none_alive, to_come, not_passed, .. } = *outlook;
         move |section| Self {
@@ -79,7 +79,7 @@ impl Request {
     }
 }
 
-/// A measured section.
+/// Measured hole of a section.
 struct Measured {
     hole: Hole,
     /// Standard deviation of the hole's diameter, m.
@@ -90,7 +90,7 @@ struct Measured {
 
 /// Inputs of judging, and the callback for changed runs.
 pub struct Judging<'a> {
-    /// All samples.
+    /// Store with all samples.
     pub store: &'a SampleStore,
     /// Latest missing samples, for the causes of fails.
     pub lacks: &'a MissingSamples,
@@ -98,7 +98,7 @@ pub struct Judging<'a> {
     pub finder: &'a mut HoleFinder,
     /// Design profile.
     pub profile: &'a Profile,
-    /// Called for every run that changes.
+    /// Function that is called for every run that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
@@ -109,7 +109,7 @@ pub struct Sections {
     target_m: f64,
     /// Number of standard deviations of D by which a pass or a fail must differ from the target.
     confidence_sd: f64,
-    /// Distance before a missed stretch at which the vehicle's origin should turn round, m.
+    /// Distance from the start of a missed stretch at which the vehicle's origin should turn round, m.
     run_up_m: f64,
     first: i64,
     /// Number of judged sections by verdict, in the order of [`Verdict::ALL`].
@@ -188,7 +188,7 @@ impl Sections {
         self.sections.len()
     }
 
-    /// Whether there are no sections.
+    /// Whether the tunnel stretch has no sections.
     pub fn is_empty(&self) -> bool {
         self.sections.is_empty()
     }
@@ -198,7 +198,7 @@ impl Sections {
         self.section_m
     }
 
-    /// Target T, m.
+    /// Coverage target T, m.
     pub fn target_m(&self) -> f64 {
         self.target_m
     }
@@ -297,7 +297,7 @@ impl Sections {
             }
         }
         let section = self.get_mut(request.section)?;
-        // At the end of the dive, no more samples will come.
+        // The dive has ended, so no more samples will come.
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         if request.ended.is_some() && section.verdict == Verdict::Open && section.is_flagged() {
@@ -333,13 +333,13 @@ impl Sections {
         }
     }
 
-    /// Returns the slot in which a judged section is counted.
+    /// Returns the slot of the verdict counts in which a judged section is counted.
     fn counted(section: &Section) -> Option<usize> {
         section.hole?;
         Some(if section.not_inspected { Verdict::ALL.len() } else { section.verdict as usize })
     }
 
-    /// Measures the hole that counts.
+    /// Measures the hole that decides a section's verdict.
     ///
     /// The hole is that of all visits, unless the newest visit alone shows that the section passes.
     fn measure(&self, index: i64, judging: &mut Judging<'_>) -> Option<Measured> {
@@ -363,7 +363,7 @@ impl Sections {
         Some(Measured { hole, sd_m, by_newest: false })
     }
 
-    /// Moves a judged section from its previous slot in the counts to its present slot.
+    /// Moves a judged section from its previous slot in the verdict counts to its present slot.
     fn count(&mut self, before: Option<usize>, now: Option<usize>) {
         if let Some(count) = before.and_then(|before| self.judged.get_mut(before)) {
             *count -= 1;

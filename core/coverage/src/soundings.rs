@@ -6,9 +6,9 @@
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 
-/// Minimum number of samples per node.
+/// Minimum number of samples that a node needs.
 pub const ENOUGH: u16 = 5;
-/// Default node edge, m.
+/// Default edge of a grid node, m.
 pub const NODE_M: f64 = 0.5;
 
 /// Extent and resolution of [`Soundings`].
@@ -16,9 +16,9 @@ pub const NODE_M: f64 = 0.5;
 pub struct GridLayout {
     /// Perimeter of the profile, m.
     pub perimeter_m: f64,
-    /// First chainage, m; rows are aligned to chainage zero.
+    /// First chainage of the grid, m; rows are aligned to chainage zero.
     pub from_m: f64,
-    /// Last chainage, m.
+    /// Last chainage of the grid, m.
     pub to_m: f64,
     /// Node edge along the tunnel, m.
     ///
@@ -37,7 +37,7 @@ pub struct Soundings {
 
 stateful!(Soundings { slots: counts; fixed: layout, first_row, columns; });
 
-/// Number of nodes of a stretch, by density.
+/// Number of grid nodes in a stretch, by density.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GridSummary {
     /// Number of nodes whose centre is in the stretch.
@@ -48,7 +48,7 @@ pub struct GridSummary {
     pub empty: u32,
 }
 
-/// A node of the grid.
+/// A node of the sounding grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridNode {
     /// Chainage of the node's centre, m.
@@ -60,7 +60,7 @@ pub struct GridNode {
 }
 
 impl GridSummary {
-    /// Share of nodes with enough samples; `None` without nodes.
+    /// Share of nodes with enough samples; `None` if there are no nodes.
     pub fn enough_share(&self) -> Option<f64> {
         (self.nodes > 0).then(|| f64::from(self.enough) / f64::from(self.nodes))
     }
@@ -83,7 +83,7 @@ impl Soundings {
         [self.layout.node_m, self.layout.perimeter_m / self.columns as f64]
     }
 
-    /// Counts a sample; returns false if the sample lies outside or isn't finite.
+    /// Counts a sample in its node; returns false if the sample lies outside the grid or isn't finite.
     ///
     /// Allocates: never.
     pub fn add(&mut self, x_m: f64, arc_m: f64) -> bool {

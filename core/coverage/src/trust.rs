@@ -18,9 +18,9 @@ pub enum Distrust {
     Outvoted(f64),
 }
 
-/// The beam of a return.
+/// Beam of a return: range, direction and motion of the head.
 pub struct Beam<'a> {
-    /// Range, m.
+    /// Range of the return, m.
     pub range_m: f64,
     /// Direction of the beam across the tunnel, rad.
     pub angle_rad: f64,
@@ -32,13 +32,13 @@ pub struct Beam<'a> {
 
 /// Evidence on one head from the vehicle's other heads.
 pub(super) struct Others {
-    /// Votes on the head.
+    /// Votes of other heads on this head.
     pub(super) ballot: Ballot,
     /// Whether another head's range varies when the range to the design varies.
     pub(super) change: bool,
 }
 
-/// Counts over half a turn.
+/// Counts of a head's returns over half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct HalfTurn {
     returns: u32,
@@ -47,7 +47,7 @@ struct HalfTurn {
     jumps: u32,
     jump_sum_m: f64,
     turned_rad: f64,
-    /// Least and greatest chainage of the returns, m.
+    /// Least and greatest chainage of the half turn's returns, m.
     between_m: Option<[f64; 2]>,
     /// Number of returns within runs of constant range.
     ///
@@ -76,7 +76,7 @@ impl HalfTurn {
         self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
     }
 
-    /// Whether the range is constant in more than one of `parts` returns.
+    /// Whether the range is constant in more than one in `parts` returns.
     ///
     /// The range to the design must vary widely for these returns.
     fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
@@ -86,13 +86,13 @@ impl HalfTurn {
             && span_m(self.design_m) > VARIES * limits.tolerance_m
     }
 
-    /// Whether more than one of `parts` returns disagrees with its neighbours.
+    /// Whether more than one in `parts` returns disagrees with its neighbours.
     fn has_one_in(&self, parts: u32) -> bool {
         parts * self.jumps.max(self.doubtful) > self.returns
     }
 }
 
-/// Minimum number of returns in half a turn.
+/// Minimum number of returns in half a turn for a decision on the head.
 const FEW: u32 = 20;
 /// A range counts as unchanged if it varies by less than this share of the tolerance.
 ///
@@ -123,11 +123,11 @@ fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     }
 }
 
-/// Successive returns with the same range.
+/// Successive returns with nearly the same range.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Unchanged {
     returns: u32,
-    /// Least and greatest range, m.
+    /// Smallest and largest range of these returns, m.
     range_m: [f64; 2],
 }
 
@@ -148,7 +148,7 @@ impl Unchanged {
 /// Trust in one head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct HeadTrust {
-    /// The present half turn, and the two half turns before.
+    /// Counts of the present half turn, and of the two half turns before.
     halves: [HalfTurn; 3],
     angle_rad: Option<f64>,
     unchanged: Unchanged,

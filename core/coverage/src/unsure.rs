@@ -32,7 +32,7 @@ pub enum Unsure {
 }
 
 impl Unsure {
-    /// All reasons.
+    /// All reasons for which a section can be unsure.
     pub const ALL: [Self; 8] = [
         Self::NotInspected,
         Self::Position,
@@ -44,7 +44,7 @@ impl Unsure {
         Self::NoWall,
     ];
 
-    /// Word used in reports and logs.
+    /// Word used for the reason in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::NotInspected => "not_inspected",
@@ -62,31 +62,31 @@ impl Unsure {
 /// Neighbouring sections that are unsure for the same reason.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stretch {
-    /// Reason of all sections in the stretch.
+    /// Reason that all sections in the stretch share.
     pub why: Unsure,
-    /// Index of the first section.
+    /// Index of the stretch's first section.
     pub from: i64,
-    /// Index after the last section.
+    /// Index after the stretch's last section.
     pub to: i64,
     /// The stretch's unsure sections in two groups.
     ///
-    /// In sections of the first group, the hole matters more than its error. In those of the second, the
-    /// error does.
+    /// In the first group, a section is unsure mainly because of its hole's size. In the second group, it is
+    /// unsure mainly because of the hole's error.
     of: [Largest; 2],
 }
 
-/// Number of unsure sections, and the figures of the one with the largest hole.
+/// Count of a group of unsure sections, and the figures of the one with the largest hole.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Largest {
-    /// Number of unsure sections.
+    /// Number of unsure sections in the group.
     pub sections: u32,
-    /// Largest hole, and its standard deviation, m.
+    /// Diameter of the group's largest hole, and its standard deviation, m.
     pub hole_m: [f64; 2],
     /// Driving figures of the section with the largest hole.
     pub driven: Driven,
 }
 
-/// Speed at which a section was driven, and the speed that fits.
+/// Speed at which a section was driven, and the largest speed that would meet the target there.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Driven {
     /// Speed along the tunnel, m/s; zero if nothing passed.
@@ -106,7 +106,7 @@ pub struct Driven {
 const UNEVEN: f64 = 1.05;
 
 impl Driven {
-    /// Returns the figures of a section's passage.
+    /// Returns the driving figures of the passage through a section.
     pub fn of(passage: &Passage) -> Self {
         let Drive { speed_mps, passes_needed, planned_gap_s, all_gap_s, .. } = passage.drive;
         Self {
@@ -118,9 +118,10 @@ impl Driven {
     }
 }
 
-/// Ratio of error to hole above which the error matters more.
+/// Ratio of the hole's error to its diameter above which a section counts as unsure mainly because of the
+/// error.
 const MOSTLY_ERROR: f64 = 0.2;
-/// Maximum gap within a stretch, m.
+/// Maximum gap between sections of one unsure stretch, m.
 ///
 /// If a vehicle repeats one section, it also passes the sections within this distance.
 const JOIN_M: f64 = 2.0;

@@ -1,4 +1,4 @@
-//! A failed section and its surroundings: counts over both, and the driving figures with some factors
+//! A failed section and its surroundings: ping counts over both, and the driving figures with some factors
 //! removed.
 
 use crate::cause::{Cause, Causes};
@@ -10,15 +10,16 @@ use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 use headrace_sampling::losses::MOST_PASSES;
 
-/// The removal of a factor helps only if it shrinks the spacing below this share of the actual spacing.
+/// The removal of a factor is worthwhile only if it shrinks the spacing of samples below this share of the
+/// actual spacing.
 pub(super) const HELPS: f64 = 0.93;
 /// Largest hole size for which the surroundings are searched for missing samples, in multiples of the target.
 pub(super) const WIDEST: f64 = 8.0;
 
-/// A failed section and its surroundings.
+/// A failed section and its surroundings, as input for explaining the fail.
 #[derive(Debug, Clone, Copy)]
 pub struct Case<'a> {
-    /// Hole of the section.
+    /// Largest hole of the section.
     pub hole: &'a Hole,
     /// Chainages of the section's two ends, m.
     pub bounds_m: (f64, f64),
@@ -28,7 +29,7 @@ pub struct Case<'a> {
     pub swept_by_all: Option<Reach>,
     /// Stretch where samples may still land; the wall in this stretch is unknown.
     pub to_come: Option<Reach>,
-    /// Whether no head was alive at the time of the request.
+    /// Whether no head was alive (pinging) at the time of the request.
     pub none_alive: bool,
     /// Whether no head pinged in the section, and at least one head passed through it in silence.
     pub is_dark: bool,
@@ -36,13 +37,14 @@ pub struct Case<'a> {
     pub is_torn: bool,
     /// Target T, m.
     pub target_m: f64,
-    /// Causes of the two neighbouring sections. Among equally small sets of causes, these are preferred.
+    /// Causes of the two neighbouring sections. Among equally small sets of causes, the search prefers these.
     pub beside: [Causes; 2],
     /// Latest missing samples.
     pub lacks: &'a MissingSamples,
 }
 
-/// Counts over the sections, and the driving figures at the moment with the largest distance between passes.
+/// Ping counts over the sections round a hole, and the driving figures at the moment with the largest
+/// distance between passes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Seen {
     pub(super) pings: u32,
@@ -83,8 +85,8 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole. If the hole is larger than the target, only a part of the
-/// target's size counts.
+/// Whether every live head has swept the hole. For a hole larger than the target, only its central part of
+/// the target's size must have been swept.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];
@@ -113,7 +115,7 @@ pub(super) fn is_remembered(case: &Case<'_>) -> bool {
     lacking.any(|lack| lack.why.has(Cause::HeadSilent))
 }
 
-/// Whether a missing sample lies in the middle part of a hole.
+/// Whether a missing sample lies in the central part of a hole.
 ///
 /// This part is at most as large as the target, because samples from ahead may still shrink the hole.
 pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
@@ -137,7 +139,7 @@ impl Drive {
         }
     }
 
-    /// Returns the driving figures with some factors removed.
+    /// Returns the driving figures as they would have been with some factors removed.
     ///
     /// If speed is among the removed factors, the lower speed is computed for `margin_m`: the target less a
     /// margin, m. With `all_turn`, no head is silent or stalled.
@@ -175,7 +177,7 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
-            // Advised speeds are lower if the vehicle hides wall from some heads.
+            // The advised speed is lower if the vehicle hides wall from some heads.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);
         }

@@ -28,7 +28,8 @@ fn sound() -> Drive {
     }
 }
 
-/// A wall with a lattice of samples except in some places, and the known facts about this wall.
+/// A wall with a lattice of samples except in some places, and the known facts about the drive past this
+/// wall.
 struct Wall {
     along_m: f64,
     around_m: f64,
@@ -155,7 +156,7 @@ fn both_causes_are_named_only_if_both_are_needed() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let why = Causes::of(Cause::MissingReturns);
     assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
-    // Scattered losses enlarge the hole, but without them the section would still fail.
+    // Scattered losses enlarge the hole. Even without these losses, the section would fail.
     let here = Some([[10.4, 10.5], [3.0, 3.1]]);
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
@@ -167,7 +168,7 @@ fn both_causes_are_named_only_if_both_are_needed() {
     );
 }
 
-/// Heads slightly out of phase enlarge the hole.
+/// The heads are slightly out of phase, which enlarges the hole.
 ///
 /// The section would pass in spite of the phase if the other two factors were removed.
 #[test]
@@ -179,7 +180,7 @@ fn two_causes_are_named_if_removing_two_of_three_factors_suffices() {
     assert_eq!(named(&wall), [Cause::TooFast, Cause::MissingReturns]);
 }
 
-/// A setting with a longer turn leaves passes farther apart.
+/// A range setting with a longer turn leaves passes farther apart.
 ///
 /// If this distance exceeds the target, the setting alone does not explain the fail.
 #[test]
@@ -228,7 +229,7 @@ fn cause_of_the_neighbouring_section_is_preferred_if_sufficient() {
         ..Wall::default()
     };
     assert_eq!(named(&wall(Cause::TooFast)), [Cause::TooFast]);
-    // Only factors that were present can be preferred.
+    // Only factors that were present in the section can be preferred.
     assert_eq!(named(&wall(Cause::Occluded)), [Cause::TooFast]);
 }
 
@@ -250,7 +251,7 @@ fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
     assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "not faster than without losses");
 }
 
-/// Checks the time between passes for each set of removed factors.
+/// Checks the expected time between passes for each set of removed factors.
 ///
 /// `drive` has this time as driven, as scheduled, without stalls, and at the planned speed.
 #[test]

@@ -5,10 +5,10 @@ use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 
-/// Search resolution, m. A circle that exceeds the required radius by less than this may be missed.
+/// Resolution of the search, m. A circle that exceeds the required radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
 
-/// Required radius of a circle, as a function of the arc length of its centre.
+/// Required radius of an empty circle, as a function of the arc length of its centre.
 pub struct Needed<'a> {
     /// Required radius at an arc length, m.
     pub radius_m: &'a dyn Fn(f64) -> f64,
@@ -106,7 +106,8 @@ mod tests {
             let most_m = radius_m(PERIMETER_M / 2.0);
             let needed = Needed { radius_m: &radius_m, most_m, slope };
             let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), [reach, None], &needed);
-            // The error of the grid is at most 5 mm in each direction, that of the search 1 mm.
+            // The error of the brute-force grid is at most 5 mm in each direction, and that of the search 1
+            // mm.
             prop_assert!(!found || best_m + 0.009 > 0.0, "found, there is {best_m}");
             prop_assert!(found || best_m <= 0.0022, "not found, there is {best_m}");
         }

@@ -6,16 +6,16 @@ use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
 
-/// Search resolution as a share of the radius. A circle whose radius is larger by less than this may be
-/// missed.
+/// Search resolution as a share of the circle's radius. A circle whose radius exceeds the required one by
+/// less than this may be missed.
 const FINE: f64 = 0.01;
 
 /// Hypothetical changes to the wall.
 #[derive(Debug, Clone, Copy)]
 pub struct WallChanges {
-    /// Factor on distances along the tunnel, above 0 and at most 1.
+    /// Factor by which distances along the tunnel are multiplied, above 0 and at most 1.
     pub along: f64,
-    /// Factor on distances around the perimeter.
+    /// Factor by which distances around the perimeter are multiplied.
     pub around: f64,
     /// Stretches whose wall counts as covered.
     pub covered: [Option<Reach>; 4],
@@ -26,7 +26,7 @@ pub struct WallChanges {
 }
 
 impl WallChanges {
-    /// No change.
+    /// Wall without any change.
     pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
 
     /// Distance of a chainage from wall that counts as covered or where samples may still land, m.
@@ -44,7 +44,7 @@ impl WallChanges {
 
 /// Returns a stretch and its mirror image, in ascending order.
 ///
-/// If they meet, they are joined to one stretch. A gap between them belongs to neither.
+/// If the two stretches meet, they are joined. A gap between them belongs to neither.
 fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
     let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
     if image_m[0] > to_m {
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn compressing_the_wall_makes_holes_smaller() {
         let all = |_, _| true;
-        // The radius is half the diagonal of a mesh of 0.5 by 0.5 m, or of 0.25 by 0.5 m.
+        // The hole's radius is half the diagonal of a mesh of 0.5 by 0.5 m, or of 0.25 by 0.5 m.
         for (otherwise, radius_m) in [
             (WallChanges::NOTHING, 0.3535),
             (WallChanges { along: 0.5, ..WallChanges::NOTHING }, 0.2795),
@@ -199,7 +199,8 @@ mod tests {
 
     #[test]
     fn wall_is_mirrored_into_the_stretch_not_yet_sampled() {
-        // On a compressed wall, a circle at the end of the samples extends ahead, where nothing has landed yet.
+        // On a compressed wall, a circle at the end of the samples extends ahead, into wall where nothing has
+        // landed yet.
         let ends = |i: u32, _| i <= 10;
         let otherwise = WallChanges { along: 0.3, ..WallChanges::NOTHING };
         let to_come = Some(Reach { from_m: 5.25, to_m: f64::INFINITY });

@@ -27,7 +27,7 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
     samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// D from all candidate maxima of f, without any code of the search.
+/// Diameter D of the largest hole from all candidate maxima of f, without any code of the search under test.
 ///
 /// Candidates are the circumcentres of three samples (or of their images), and points on the section's two ends that
 /// are equidistant from two samples.
@@ -37,7 +37,7 @@ fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64)
     let mut candidates = Vec::new();
     for (i, a) in images.iter().enumerate() {
         for (j, b) in images.iter().enumerate().skip(i + 1) {
-            // |c - a| = |c - b| is the line n . c = k.
+            // The points c with |c - a| = |c - b| form the line n . c = k.
             let n = (b.0 - a.0, b.1 - a.1);
             let k = (b.0 * b.0 + b.1 * b.1 - a.0 * a.0 - a.1 * a.1) / 2.0;
             if n.1.abs() > 1e-12 {
@@ -75,7 +75,7 @@ proptest! {
         prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
     }
 
-    /// The reference for the window's search is brute force.
+    /// The reference for the nearest-sample search in a window is brute force.
     #[test]
     fn window_finds_the_nearest_sample(
         samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
@@ -98,8 +98,8 @@ proptest! {
         }
     }
 
-    /// D lies within the bounds found by a search with a tolerance. The bounds are at most the tolerance
-    /// apart.
+    /// The exact diameter D lies within the bounds found by a search with a tolerance. The bounds are at most
+    /// the tolerance apart.
     ///
     /// A verdict from these bounds equals the exact one, or is undecided if T lies between them.
     #[test]
@@ -120,7 +120,7 @@ proptest! {
         }
     }
 
-    /// The bounds also hold with packed samples, because they include the displacement by packing.
+    /// The bounds also hold for packed samples, because they include the displacement that packing causes.
     #[test]
     fn bounds_with_packed_samples_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -191,7 +191,8 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// D depends neither on the order of the samples, nor on the seam, nor on the origin of the chainage.
+    /// D depends neither on the order of the samples, nor on the seam of the unrolled wall, nor on the origin
+    /// of the chainage.
     #[test]
     fn hole_is_independent_of_sample_order_seam_and_chainage_origin(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
@@ -249,7 +250,7 @@ fn hole_of_samples_with_nanometre_and_metre_spacings_is_correct() {
     found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
-/// Far along the tunnel, D is the same to within the precision of doubles at that chainage.
+/// Far along the tunnel, D is the same to within the floating-point precision at that chainage.
 #[test]
 fn hole_is_the_same_at_7_km_and_at_1000_km() {
     let samples: Vec<_> =

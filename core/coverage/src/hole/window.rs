@@ -3,9 +3,9 @@
 use crate::store::SampleStore;
 use headrace_geometry::math;
 
-/// Maximum number of samples.
+/// Maximum number of samples in a window.
 const ROOM: usize = 1 << 20;
-/// Maximum number of cells.
+/// Maximum number of cells in a window.
 const CELLS: usize = 1 << 20;
 
 /// Sample position: chainage from the window's origin, and arc length, m.
@@ -28,13 +28,13 @@ pub(super) struct Nearest {
     pub distance2: f64,
 }
 
-/// A stretch of wall with all its samples.
+/// A window: a stretch of wall with all its samples, sorted into cells.
 #[derive(Debug)]
 pub(super) struct Window {
     perimeter_m: f64,
-    /// Chainage of the origin, m.
+    /// Chainage of the window's origin, m.
     origin_m: f64,
-    /// Distance of the first row from the origin, m.
+    /// Distance of the first row of cells from the origin, m.
     from_m: f64,
     cell_m: f64,
     column_m: f64,
@@ -46,7 +46,7 @@ pub(super) struct Window {
     begins: Vec<u32>,
     spots: Vec<Spot>,
     unsorted: Vec<(u32, Spot)>,
-    /// Whether there were more samples than fit.
+    /// Whether there were more samples than the window can hold.
     pub overfull: bool,
 }
 
@@ -70,7 +70,8 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Loads all samples between two chainages relative to `origin_m` into cells of about `cell_m`.
+    /// Loads into the window all samples between two chainages relative to `origin_m`. Cells are about
+    /// `cell_m` long.
     ///
     /// Samples of visits from `first_visit` on count.
     ///
@@ -174,7 +175,7 @@ impl Window {
         self.origin_m + x_m
     }
 
-    /// Perimeter, m.
+    /// Perimeter of the wall, m.
     pub(super) fn perimeter_m(&self) -> f64 {
         self.perimeter_m
     }
@@ -217,12 +218,12 @@ impl Window {
         Some(Nearest { x_m: spot.x_m, arc_m: spot.arc_m, turns, distance2: best.limit2 })
     }
 
-    /// Searches a row near a point; returns false if the whole row is out of range.
+    /// Searches a row of cells near a point; returns false if the whole row is out of range.
     fn look_in_row(&self, row: usize, best: &mut Search) -> bool {
         let low = self.from_m + row as f64 * self.cell_m - best.x_m;
         let away = low.max(-(low + self.cell_m)).max(0.0);
         let width2 = best.limit2 - away * away;
-        // The margin allows for rounding of the row's edges.
+        // The margin allows for rounding of the row's edge coordinates.
         if width2 < -1e-9 {
             return false;
         }
@@ -251,13 +252,13 @@ impl Window {
         true
     }
 
-    /// Returns the samples of a range of cells in a row.
+    /// Returns the samples of a range of cells in a row of the window.
     fn spots(&self, from: usize, to: usize) -> &[Spot] {
         let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return &[] };
         self.spots.get(*begin as usize..*end as usize).unwrap_or_default()
     }
 
-    /// Searches a range of cells in a row, shifted by whole turns.
+    /// Searches a range of cells in a row, shifted by whole turns round the perimeter.
     fn look_at(&self, from: usize, to: usize, turns: f64, best: &mut Search) {
         let arc_m = best.arc_m - turns * self.perimeter_m;
         for spot in self.spots(from, to) {
@@ -299,7 +300,7 @@ struct Search {
 }
 
 impl Search {
-    /// Keeps a sample if it is nearer than the one found, and returns whether it is.
+    /// Keeps a sample if it is nearer than the nearest one found so far, and returns whether it is.
     fn takes(&mut self, spot: &Spot, turns: f64, distance2: f64) -> bool {
         let is_nearer = distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none());
         if is_nearer {
@@ -308,7 +309,7 @@ impl Search {
         is_nearer
     }
 
-    /// Whether the found sample is near enough to stop the search.
+    /// Whether the sample found is near enough to stop the search.
     fn is_enough(&self) -> bool {
         self.limit2 <= self.enough2 && self.found.is_some()
     }

@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs, together with the section states that they must match.
+/// Runs under test, together with the section states that they must match.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
@@ -29,7 +29,7 @@ impl Rig {
 
     fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        // No speed helps against holes of a metre or more.
+        // No speed helps against holes of a metre or more in this test.
         let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
         let failing = causes.map(|causes| Failing { causes, again_mps });
         (self.failing[slot], self.holes[slot]) = (failing, diameter_m);
@@ -173,7 +173,7 @@ proptest! {
             let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(lost)];
             rig.say_all(section, causes[usize::from(cause)], diameter_m);
         }
-        // Many changes may exhaust the run numbers. Some sections then have no run.
+        // Many changes may exhaust the run numbers, which leaves some sections without a run.
         if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {
             rig.check();
         }

@@ -14,18 +14,18 @@ use headrace_geometry::math;
 /// This distance bounds the delay of a flag.
 const LOOK_M: f64 = 0.125;
 
-/// Initial limits. Every finite reach is beyond them, so the first movement causes a check.
+/// Initial check positions. Every finite reach is beyond them, so the first movement causes a check.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Sections {
-    /// Whether the heads have moved far enough for sections to be due.
+    /// Whether the heads have moved far enough for some sections to be due for judging.
     pub fn may_be_due(&self, moved: &Moved) -> bool {
         let [behind_m, ahead_m] = self.next_look_m;
         let is_due = |reach: Reach| reach.from_m >= behind_m || reach.to_m <= ahead_m;
         !moved.is_nothing() || moved.to_come.is_some_and(is_due)
     }
 
-    /// Sets the next places to check.
+    /// Sets the chainages at which the heads' movement causes the next check.
     ///
     /// A check is due each time the heads have left a further part of a section. This part lies behind the
     /// vehicle, or ahead of a vehicle that goes back.
@@ -65,7 +65,7 @@ impl Sections {
             }
         }
         let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
-        // The heads may have left only a part of the sections at the zone's ends.
+        // The heads may have moved past only a part of the sections at the zone's ends.
         let behind = moved.left_behind.end - far..moved.left_behind.end + 1;
         let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
         for range in [behind, ahead] {
@@ -154,7 +154,8 @@ impl Sections {
                 debug_assert!(false, "section {index} of the coverage extent exists");
                 continue;
             };
-            // Samples too far away to change a pass may have reduced the hole of a failed section.
+            // Samples too far away to change a pass may nevertheless have reduced the hole of a failed
+            // section.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 ask(Request { ended: Some(Ended(outlook.through)), ..ask_for(index) });
@@ -175,8 +176,8 @@ mod tests {
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
-    /// Sections that the heads have left in part are checked every few centimetres of travel, behind and
-    /// ahead.
+    /// Sections that the heads have passed only in part are checked every few centimetres of travel, behind
+    /// and ahead.
     #[test]
     fn next_check_is_due_after_a_few_centimetres_of_travel() {
         let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);

@@ -136,7 +136,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
             errors: [PassError::default(); 2],
         };
         let around = math::round_to_i64(perimeter_m / mesh_m);
-        // The centre between two rows is the centre of the section.
+        // The centre between two rows of samples is the centre of the section.
         let rows = math::floor_to_i64(2.0 / mesh_m);
         for (i, k) in (-rows..rows).flat_map(|i| (0..around).map(move |k| (i, k))) {
             let (x_m, arc_m) = (5.125 + mesh_m * (i as f64 + 0.5), perimeter_m / around as f64 * k as f64);

@@ -34,11 +34,11 @@ const WORDS_PER_BRICK: usize = 48;
 /// A sample on the unrolled wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallSample {
-    /// Chainage, m.
+    /// Chainage of the sample, m.
     pub x_m: f64,
-    /// Arc length along the profile, m.
+    /// Arc length of the sample along the profile, m.
     pub arc_m: f64,
-    /// Number of the head, below [`MAX_HEADS`].
+    /// Number of the head that measured the sample, below [`MAX_HEADS`].
     pub head: usize,
     /// Step from the same head's previous sample, along the tunnel and along the perimeter, m.
     ///
@@ -53,13 +53,13 @@ pub struct WallSample {
 pub struct StoreLayout {
     /// Perimeter of the profile, m.
     pub perimeter_m: f64,
-    /// First chainage, m.
+    /// First chainage of the store, m.
     pub from_m: f64,
-    /// Last chainage, m.
+    /// Last chainage of the store, m.
     pub to_m: f64,
     /// Nominal edge of a cell, m. Half the target is a good value for the searches.
     pub cell_m: f64,
-    /// Minimum capacity in samples.
+    /// Minimum capacity of the store in samples.
     pub capacity: u32,
 }
 
@@ -90,7 +90,7 @@ pub enum StoreError {
     Full,
 }
 
-/// Bounds on the difference between the stored samples of a stretch and the inserted ones.
+/// Bounds on the difference between the samples stored for a stretch and those inserted there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fidelity {
     /// Maximum distance of a dropped sample from a stored one, m.
@@ -110,16 +110,16 @@ pub struct StoreUse {
     pub bytes: usize,
 }
 
-/// A group of cell rows.
+/// A brick: a group of rows of cells.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Brick {
-    /// Link to the brick's first block in the arena, or zero.
+    /// Link to the brick's first block of packed samples, or zero.
     first_block: u32,
     /// Number of samples in the brick.
     count: u32,
-    /// Slot plus one if the brick is open, or zero.
+    /// Slot plus one if the brick is open (unpacked), or zero.
     slot: u16,
-    /// Coarsest thinning tier applied.
+    /// Coarsest thinning tier applied to the brick.
     tier: u8,
     /// Whether the brick has been packed before, which may have moved its samples.
     moved: bool,
@@ -434,7 +434,7 @@ impl SampleStore {
         inside.then(|| self.row_near(x_m))
     }
 
-    /// Returns the row at a chainage, or the row nearest to it.
+    /// Returns the row of cells at a chainage, or the row nearest to it.
     fn row_near(&self, x_m: f64) -> i64 {
         math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m).clamp(0, self.rows - 1)
     }

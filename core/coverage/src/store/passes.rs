@@ -6,11 +6,11 @@ use super::SampleStore;
 use super::open::Node;
 use headrace_geometry::math;
 
-/// Query point of a pass search.
+/// Point from which a pass search looks for the nearest pass.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     x_m: f64,
-    /// Arc length in [0, perimeter), m.
+    /// Arc length of the query point in [0, perimeter), m.
     arc_m: f64,
     perimeter_m: f64,
 }

@@ -41,7 +41,7 @@ fn pack_the_first_40_m(store: &mut SampleStore) {
     assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all bricks must be packed");
 }
 
-/// Stored samples of the first 40 m, sorted.
+/// Samples stored in the first 40 m, sorted.
 fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
     store.each_between(-1.0, 40.0, |x_m, arc_m, _| kept.push((x_m, arc_m)));
@@ -78,7 +78,7 @@ fn places(most: usize) -> impl Strategy<Value = Vec<(f64, f64)>> {
 }
 
 proptest! {
-    /// The reference is brute force over every step.
+    /// The reference for the nearest pass is brute force over every step.
     #[test]
     fn nearest_pass_agrees_with_brute_force(
         places in places(60),

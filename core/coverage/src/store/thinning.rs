@@ -10,7 +10,8 @@ use super::open::{CellAt, OpenBricks};
 /// A tier applies from its number of samples on. It drops samples closer than its share to a stored sample.
 const TIERS: [(u32, f64); 4] = [(64, 1.0 / 128.0), (96, 1.0 / 64.0), (128, 1.0 / 32.0), (160, 1.0 / 16.0)];
 
-/// Samples at the end of a step are thinned only once a cell holds this many more samples.
+/// Samples at the end of a step are thinned only once a cell holds this many samples beyond the tier's
+/// number.
 const PASSES: u32 = 64;
 
 /// Maximum distance of a dropped sample from a stored one after thinning up to a tier, m.

@@ -5,7 +5,7 @@ use headrace_geometry::math::{self, TAU};
 
 const STEPS: u32 = 150;
 
-/// Heads that turn together, evenly spread, on a moving vehicle.
+/// Test fixture: heads that turn together, evenly spread, on a moving vehicle.
 struct Turning {
     limits: WallLimits,
     relief: Relief,
@@ -33,7 +33,7 @@ impl Turning {
         }
     }
 
-    /// Simulates some turns.
+    /// Simulates some turns of the heads.
     ///
     /// `heard` returns the range from the centre that a head measures, for head, chainage, angle, and the numbers of
     /// turn and step; `None` without a return.
@@ -92,7 +92,8 @@ fn smooth_rough_and_wide_walls_are_accepted_in_tunnels_of_any_size() {
         // The wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one along it.
         Turning::new(radius_m, 2)
             .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
-        // A vehicle measures these ranges if it is not in the centre, where its estimated position is.
+        // The vehicle measures such ranges if it is beside the centre while its estimated position is in the
+        // centre.
         Turning::new(radius_m, 1).all_wall(10, |_, angle| radius_m * (1.0 + 0.15 * math::sin(angle)));
     }
 }
@@ -222,7 +223,7 @@ fn outvoted_head_is_distrusted_until_it_agrees_with_the_others() {
         }
         let counts = turning.turn(6, frozen);
         assert_eq!((counts[wrong].wall, counts[wrong].doubtful), (0, 6 * STEPS as usize));
-        // The chainage begins at zero again, as if the vehicle had gone back to its start.
+        // The test's chainage begins at zero again, as if the vehicle had gone back to its start.
         turning.turn(4, |_, _, _, _| Some(1.0));
         let counts = turning.turn(4, |_, _, _, _| Some(1.0));
         assert_eq!(counts[wrong].doubtful, 0, "the head is trusted again");
@@ -291,7 +292,7 @@ fn stuck_head_is_distrusted_until_its_range_varies() {
             }
         }
         let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
-        // All wall samples since the head got stuck are withdrawn, and no sample from before.
+        // All wall samples since the head got stuck are withdrawn. Samples from before that are kept.
         let begun_m = 0.001 * f64::from(2 * STEPS);
         assert!((from_m - begun_m).abs() <= 0.001 + 1e-9, "{from_m}");
         assert!(
