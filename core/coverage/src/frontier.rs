@@ -435,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn section_is_left_behind_once_the_last_head_is_past_it_by_the_margin() {
+    fn section_leaves_the_zone_once_the_last_head_is_past_it_by_the_margin() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
@@ -446,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn sections_are_left_ahead_when_the_vehicle_moves_backwards() {
+    fn sections_ahead_leave_the_zone_when_the_vehicle_moves_backwards() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 2.0, 0.25, 0.25);
         let moved = frontier.advance(0, MonoNs(1), 1.7, 0.25, 0.25);
@@ -469,7 +469,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_head_does_not_delay_leaving_sections() {
+    fn silent_head_does_not_keep_sections_in_the_zone() {
         let mut frontier = Fixture::default();
         frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);
@@ -521,7 +521,7 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_position_decides_which_sections_are_left_if_no_head_is_alive() {
+    fn vehicle_position_decides_which_sections_leave_the_zone_if_no_head_is_alive() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
@@ -552,7 +552,7 @@ mod tests {
     }
 
     #[test]
-    fn every_head_is_awaited_again_after_all_heads_were_silent() {
+    fn sections_wait_for_every_head_again_after_all_heads_were_silent() {
         let mut frontier = Fixture::default();
         frontier.beat(0, 3.0);
         frontier.beat(5, 4.0);

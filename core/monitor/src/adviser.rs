@@ -300,7 +300,7 @@ mod tests {
     /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, heads 0.8 m apart
     /// reach the same place 8 s after one another.
     #[test]
-    fn swing_covers_the_time_between_passes_and_between_heads_along_the_hull() {
+    fn vehicle_rotation_spans_the_time_between_passes_and_between_heads_along_the_hull() {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();

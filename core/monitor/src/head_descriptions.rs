@@ -101,7 +101,7 @@ pub(crate) mod tests {
 
     /// A mode is named if all heads have it. A range is named if it is long enough for all heads.
     #[test]
-    fn settings_are_named_only_if_they_suit_all_heads() {
+    fn alternative_settings_are_named_only_if_they_suit_all_heads() {
         let head = |finer: &str, longer_m: f64| HeadSettings {
             name: String::new(),
             finer: Some(ModeName::new(finer)),

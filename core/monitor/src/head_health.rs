@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn constant_range_is_stuck_if_the_wall_distance_varies() {
+    fn head_with_constant_range_is_stuck_if_the_wall_distance_varies() {
         let stuck = |pings: u32, spread_m: f64| {
             let mut hearing = HeadHealth::default();
             for ping in 0..pings {

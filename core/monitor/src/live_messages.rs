@@ -414,7 +414,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pause_keeps_reported_stretches_and_jump_drops_them() {
+    fn playback_pause_keeps_reported_stretches_and_playback_jump_drops_them() {
         let missed = ReportedMiss { run: RunId(1), from: 0, to: 4 };
         let mut messages =
             LiveMessages { missed: vec![missed], played: Some(MonoNs(5)), ..LiveMessages::default() };

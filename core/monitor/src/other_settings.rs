@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn turn_period_is_that_of_the_mode_with_the_fastest_speed() {
+    fn predicted_turn_period_is_that_of_the_mode_allowing_the_highest_speed() {
         // At 6 m from the wall, 0.9 degrees are 0.094 m, and 0.6 degrees are 0.063 m.
         let at = |target_m: f64| of_head(&head(2.4, None), 6.0, target_m);
         let roomy = at(0.2);

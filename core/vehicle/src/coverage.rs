@@ -36,7 +36,7 @@ impl Default for CoverageConfig {
     }
 }
 
-/// Default limit of the deviation from the profile: a share of the radius, but at most 0.5 m.
+/// Default limit of the deviation from the design profile: a share of the radius, but at most 0.5 m.
 ///
 /// The radius is that of a circle with the profile's perimeter.
 const CONTRADICTION_SHARE: f64 = 0.2;
@@ -48,12 +48,12 @@ impl CoverageConfig {
     /// Returns the default deviation above which a sample contradicts a profile of this perimeter, m.
     ///
     /// The value exceeds the thickness of a lining, and the error of a design that is 6 % off. It is smaller
-    /// than the deviation of another tunnel.
+    /// than the deviation expected in a different tunnel.
     pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
-    /// Reads both tables from the root of a vehicle file.
+    /// Reads the tables `[coverage]` and `[[openings]]` from the root of a vehicle file.
     ///
     /// `profile` or `target_m` is `None` if its keys in the file are invalid. The tables are then checked as
     /// far as possible.

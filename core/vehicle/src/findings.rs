@@ -19,18 +19,18 @@ use crate::VehicleConfig;
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grade {
-    /// The file cannot work as written.
+    /// The vehicle file cannot work as written.
     Error,
-    /// The file works, but at a cost, or only if the setting is intended.
+    /// The vehicle file works, but at a cost, or only if the setting is intended.
     Warning,
 }
 
-/// A problem in a file whose keys are valid individually.
+/// A problem in a vehicle file whose keys are valid individually.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
     /// Severity of the finding.
     pub grade: Grade,
-    /// Dotted path of the key, which may be absent from its table.
+    /// Dotted path of the key that the finding is about; the key may be absent from its table.
     pub key: String,
     /// The problem, and what to do about it.
     pub problem: String,
@@ -42,7 +42,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Number of beams per turn that are checked.
+/// Number of beams per turn that the check of head ranges casts.
 const BEAMS: u32 = 720;
 /// Minimum share of the wall that a head must reach.
 ///
@@ -54,7 +54,7 @@ const SAME_TURN: f64 = 1e-6;
 ///
 /// No return resolves finer details of a wall.
 const FINEST_M: f64 = 0.002;
-/// Edge length that approximates a wall's curve to within [`FINEST_M`] at any radius, m.
+/// Edge length of a polyline that approximates a wall's curve to within [`FINEST_M`] at any radius, m.
 ///
 /// The sagitta e^2 / (8 r) is 0.1 mm in the narrowest pipe, whose radius is 0.1 m.
 const ENOUGH_M: f64 = 0.01;
@@ -208,7 +208,7 @@ impl VehicleConfig {
         if tunnel.name != "polyline" {
             return None;
         }
-        // The first and the last piece are one edge, split at the floor's centre.
+        // The first and the last piece of the profile are one edge, split at the floor's centre.
         let pieces = tunnel.profile.pieces_m();
         let edges = pieces.len().saturating_sub(1);
         let whole = pieces.take(edges).skip(1);
@@ -267,7 +267,7 @@ fn warning(key: String, problem: String) -> Finding {
     Finding { grade: Grade::Warning, key, problem }
 }
 
-/// Names the end that both connections share; `None` if they lead to different ends.
+/// Names the end (port, address, interface or device) that two connections share; `None` if they lead to different ends.
 fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
     match (a, b) {
         (Connect::Serial { port: a, .. }, Connect::Serial { port: b, .. }) => {

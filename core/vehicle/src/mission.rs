@@ -15,7 +15,7 @@ use crate::coverage::CoverageConfig;
 pub struct Mission {
     /// Design profile.
     pub profile: Profile,
-    /// Water, gravity and levels.
+    /// Water properties, gravity and levels of the site.
     pub site: Site,
     /// Depth sensor whose temperature determines the speed of sound, instead of the site's value.
     pub sound_speed_from: Option<String>,
@@ -25,7 +25,7 @@ pub struct Mission {
     pub section_m: f64,
     /// Length of the tunnel, m; samples beyond it are counted but not stored.
     pub length_m: f64,
-    /// Arrangement of the heads: phase shift or sector offset.
+    /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
     /// Speed for which the heads' phases are planned, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
@@ -33,21 +33,21 @@ pub struct Mission {
     pub hull: Vec<Obstacle>,
     /// Verdict parameters and openings of the wall.
     pub coverage: CoverageConfig,
-    /// Resolution and update rate of the advice's view of the wall.
+    /// Resolution and recast interval of the rays that locate the wall for the speed advice.
     pub looks: Looks,
     /// Time limit of the dive, counted from the first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
     /// Timing of alerts by class.
     pub alerts: AlertTiming,
-    /// Limits of cable and time.
+    /// Limits of cable length and dive time.
     pub limits: LimitsConfig,
 }
 
 impl Mission {
     /// Creates a mission with defaults.
     ///
-    /// The tunnel is 100 m long, with sections of 0.25 m at the default site. The layout is phase shift; there are no
-    /// hull parts and no time limit, and holes are computed exactly.
+    /// The tunnel is 100 m long, with sections of 0.25 m at the default site. The heads are in phase-shift
+    /// mode. There are no hull parts and no time limit, and holes are computed exactly.
     pub fn new(profile: Profile, target_m: f64) -> Self {
         let contradiction_m = CoverageConfig::usual_contradiction_m(profile.perimeter_m());
         Self {
@@ -76,7 +76,7 @@ impl Mission {
             && [planned_speed_mps, hole_tolerance_m, confidence_sd].iter().all(|number| **number >= 0.0)
     }
 
-    /// Whether pings land at the same places on the wall as in another mission.
+    /// Whether pings land at the same places on the wall as with the settings of another mission.
     ///
     /// True if tunnel, water, layout and hull are the same.
     pub fn places_as(&self, other: &Self) -> bool {

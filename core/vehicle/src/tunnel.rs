@@ -4,14 +4,14 @@ use headrace_config::{ConfigError, Loader, Section};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
-/// The `[tunnel]` table.
+/// The `[tunnel]` table: profile and length of the tunnel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TunnelConfig {
-    /// Name of the profile in the file.
+    /// Name of the profile in the vehicle or scene file.
     pub name: String,
     /// Design profile of the cross-section.
     pub profile: Profile,
-    /// Length along the axis from the portal at chainage 0, m.
+    /// Length along the tunnel's axis from the portal at chainage 0, m.
     pub length_m: f64,
 }
 

@@ -26,19 +26,19 @@ use headrace_sensor::device::{CounterSpec, Device, DeviceKind, Sense};
 
 /// A validated vehicle file.
 pub struct VehicleConfig {
-    /// Vehicle name.
+    /// Name of the vehicle.
     pub name: String,
     /// Target T: the largest hole that passes, m.
     pub target_m: f64,
     /// Length of a section along the tunnel, m.
     pub section_m: f64,
-    /// Water, gravity and levels.
+    /// Water properties, gravity and levels of the site.
     pub site: Site,
     /// Depth sensor whose temperature determines the speed of sound, instead of the site's value.
     pub sound_speed_from: Option<String>,
-    /// The tunnel.
+    /// The tunnel: profile and length.
     pub tunnel: TunnelConfig,
-    /// Arrangement of the heads: phase shift or sector offset.
+    /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
     /// Speed for which the heads' phases are planned, m/s. With zero, the heads' positions along the hull are
     /// ignored.
@@ -49,17 +49,17 @@ pub struct VehicleConfig {
     pub coverage: CoverageConfig,
     /// Navigation method and settings.
     pub navigation: NavigationConfig,
-    /// Resolution and update rate of the advice's view of the wall.
+    /// Resolution and recast interval of the rays that locate the wall for the speed advice.
     pub looks: Looks,
     /// Time limit of the dive.
     pub dive_time: Option<DurNs>,
     /// Timing of alerts by class.
     pub alerts: AlertTiming,
-    /// Limits of cable and time.
+    /// Limits of cable length and dive time.
     pub limits: LimitsConfig,
     /// The sensors, in the order of the file, which is also the order of their sources.
     pub sensors: Vec<Box<dyn Device>>,
-    /// The common part of each sensor's table, in the same order as `sensors`.
+    /// The keys common to all kinds of sensor, for each sensor, in the same order as `sensors`.
     pub sensor_configs: Vec<SensorConfig>,
     /// Step and noise of the cable counter; `None` without one.
     pub counter: Option<CounterSpec>,
@@ -67,13 +67,14 @@ pub struct VehicleConfig {
     pub attachments: Vec<(String, String)>,
 }
 
-/// The `[water]` table and levels; see [`Site`].
+/// The `[water]` table and the water levels; see [`Site`].
 pub type WaterConfig = Site;
 
-/// Allowed targets, m.
+/// Allowed values of the target, m.
 pub(super) const TARGET_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 
-/// Limits that keep the startup allocation to some hundred megabytes each for sections and wall cells.
+/// Limits on the number of sections and wall cells. They keep the startup allocation to some hundred
+/// megabytes for each.
 const MAX_SECTIONS: f64 = 400_000.0;
 const MAX_CELLS: f64 = 2e8;
 

@@ -110,7 +110,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
 }
 
 #[test]
-fn each_single_cause_is_named() {
+fn fail_with_a_single_cause_names_that_cause() {
     for (cause, wall) in [
         (
             Cause::TooFast,

@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn added_samples_fill_the_hole() {
+    fn hypothetically_added_samples_fill_the_hole() {
         let gone = |i: u32, k: u32| !(i == 10 && k == 4);
         let hole_m = 0.5;
         assert!(has(gone, 0.99 * hole_m, &WallChanges::NOTHING, &[]));
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn compressing_the_wall_makes_holes_smaller() {
+    fn hypothetically_compressed_wall_has_smaller_holes() {
         let all = |_, _| true;
         // The hole's radius is half the diagonal of a mesh of 0.5 by 0.5 m, or of 0.25 by 0.5 m.
         for (otherwise, radius_m) in [
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn mirroring_a_stretch_gives_two_stretches_without_their_gap() {
+    fn mirrored_stretch_and_original_exclude_the_gap_between_them() {
         let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
             assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
         };

@@ -77,7 +77,7 @@ proptest! {
 
     /// The reference for the nearest-sample search in a window is brute force.
     #[test]
-    fn window_finds_the_nearest_sample(
+    fn window_search_finds_the_nearest_sample(
         samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
         place in (0.0f64..1.0, -8.0f64..16.0),
         within_m in 0.05f64..3.0,
@@ -279,7 +279,7 @@ fn hole_is_the_same_at_7_km_and_at_1000_km() {
 ///
 /// The samples are positions only, without steps.
 #[test]
-fn ideal_helices_have_the_reference_holes() {
+fn largest_holes_of_ideal_helices_match_reference_values() {
     let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();
     let perimeter_m = profile.perimeter_m();
     let modes = [
@@ -336,7 +336,7 @@ fn samples_of_visits_before_the_requested_one_are_ignored() {
 
 /// A hole that has grown, moved along or around the tunnel, or become unbounded is a different hole.
 #[test]
-fn holes_are_alike_if_size_and_position_differ_by_under_1_cm() {
+fn holes_count_as_equal_if_size_and_position_differ_by_under_1_cm() {
     let hole = Hole { diameter_m: 0.6, least_m: 0.6, most_m: 0.6, x_m: 7.0, arc_m: 3.0, bounded: true };
     let little = Hole { diameter_m: 0.609, x_m: 6.991, arc_m: 3.009, ..hole };
     assert!(hole.is_like(&little) && little.is_like(&hole));

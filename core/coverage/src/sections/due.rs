@@ -288,7 +288,7 @@ mod tests {
     /// The diameter of this part is twice the distance of the hole's centre from the heads' reach. A hole
     /// that lies completely out of reach gets its final verdict.
     #[test]
-    fn hole_is_judged_once_a_large_enough_part_is_out_of_reach() {
+    fn hole_is_judged_once_a_large_enough_part_is_beyond_the_heads_reach() {
         let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
             alone(9, |section| {
                 (section.hole, section.hole_sd_m) = (Some(hole(diameter_m, x_m)), sd_m);

@@ -12,7 +12,7 @@ fn sections() -> Sections {
 }
 
 #[test]
-fn stretch_contains_all_existing_sections_that_it_touches() {
+fn sections_of_a_stretch_are_all_existing_ones_that_it_touches() {
     let of = |from_m: f64, to_m: f64| sections().sections_of(Some(Reach { from_m, to_m }));
     assert_eq!(of(1.1, 1.9), 4..8);
     assert_eq!(of(1.0, 2.0), 4..9, "both ends at section boundaries");
@@ -42,7 +42,7 @@ fn each_section_counts_once_in_the_metres_of_its_latest_verdict() {
 ///
 /// A section without pings has the largest error of the sections within half the target.
 #[test]
-fn section_without_pings_takes_the_largest_position_error_nearby() {
+fn section_without_pings_has_the_largest_position_error_nearby() {
     let error_of = |placed_in: i64, asked: i64| {
         let mut sections = sections();
         for (index, sd_m) in [(placed_in, 0.03), (30, 0.01)] {
@@ -99,7 +99,7 @@ fn verdict_requires_the_configured_number_of_standard_deviations() {
 }
 
 #[test]
-fn verdict_stays_open_until_enough_of_the_hole_is_out_of_reach() {
+fn verdict_stays_open_until_enough_of_the_hole_is_beyond_the_heads_reach() {
     let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
     assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
     let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);

@@ -346,7 +346,7 @@ fn packed_stretch_that_fills_all_open_bricks_can_be_read() {
 
 /// Packed samples of a turning head take four bytes each, whether they are in single steps or not.
 #[test]
-fn packed_sweep_takes_one_word_per_sample() {
+fn packed_samples_of_a_sweep_take_one_word_each() {
     for is_stepped in [true, false] {
         let mut store = SampleStore::new(LAYOUT);
         let all = store.arena.free_words();

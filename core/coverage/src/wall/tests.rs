@@ -141,7 +141,7 @@ fn object_seen_in_one_turn_is_doubtful_and_object_seen_again_is_wall() {
 
 /// A heap is higher than it is wide, and its foot slopes to the wall.
 #[test]
-fn run_ending_in_a_slope_to_the_wall_is_wall() {
+fn run_of_returns_ending_in_a_slope_to_the_wall_is_wall() {
     let steep = |_: f64, angle: f64| {
         let off = (angle - 3.0).abs();
         6.0 - (1.4 - 12.0 * off).max(0.0)
@@ -303,7 +303,7 @@ fn stuck_head_is_distrusted_until_its_range_varies() {
 }
 
 #[test]
-fn tolerances_scale_with_the_cross_section() {
+fn wall_classification_limits_scale_with_the_cross_section() {
     let of = |radius_m: f64| WallLimits::new(TAU * radius_m, (0.2 * radius_m).min(0.5));
     assert!((of(1.0).tolerance_m - 0.1).abs() < 1e-12 && (of(1.0).contradiction_m - 0.2).abs() < 1e-12);
     assert!((of(0.15).tolerance_m - 0.03).abs() < 1e-12, "not below the sonars' accuracy");

@@ -349,7 +349,7 @@ fn alert_spans_only_wall_that_is_still_missed() {
 }
 
 #[test]
-fn merged_runs_keep_the_lower_number_and_stay_unacknowledged() {
+fn alert_of_merged_runs_keeps_the_lower_number_and_stays_unacknowledged() {
     let mut bench = Bench::new(0.0, 0.0);
     bench.run(0, RunChange::Raised, (10, 11), None);
     bench.run(1, RunChange::Raised, (14, 15), None);

@@ -47,7 +47,7 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
 
 /// The position is doubtful once two standard deviations exceed a fifth of the target.
 #[test]
-fn position_is_doubtful_if_passes_are_uncertain_or_the_cable_is_distrusted() {
+fn position_is_doubtful_if_the_pass_error_is_large_or_the_cable_counter_is_distrusted() {
     let spread = PositionState::Doubtful(PositionDoubt::Spread);
     let cable = PositionState::Doubtful(PositionDoubt::Cable);
     for (pass_error_m, is_cable_doubted, lacking, expected) in [
@@ -152,7 +152,7 @@ fn command_is_applied_before_the_results_of_the_next_event() {
 }
 
 #[test]
-fn update_applies_only_earlier_inputs() {
+fn alerter_update_applies_only_inputs_before_the_update() {
     let at =
         |run: RunInput, command_before: usize, beat: usize| Bench::new(run, command_before).until(Some(beat));
     assert_eq!(at(run(4, false), 9, 5), (1, 0, 0, Some(4)));

@@ -351,7 +351,7 @@ mod tests {
     /// The place is 1 m below the centre of a pipe of 3 m radius. Per radian, a step measures 2 m along the
     /// floor, 4 m along the ceiling and 3 m at the sides.
     #[test]
-    fn largest_step_is_found_for_each_class_of_time_between_passes() {
+    fn largest_step_is_found_for_each_class_of_waiting_time_until_the_next_pass() {
         const SMALL_RAD: f64 = 1e-4;
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn sample_beyond_the_store_breaks_the_sweep() {
+    fn sample_outside_the_store_extent_interrupts_the_sweep() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
         note_sample(&mut coverage, &mut sweep, &tunnel, &at(0)).unwrap();
         let outside = note_sample(&mut coverage, &mut sweep, &tunnel, &heard(33.0, 0.1, 3.0));

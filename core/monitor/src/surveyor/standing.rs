@@ -169,7 +169,7 @@ mod tests {
     /// At 0.4 m/s, 2 m are covered in five seconds. The checked wall extends from a quarter of a metre behind
     /// the rear head to a quarter of a metre ahead of the front head's future place.
     #[test]
-    fn condition_is_passed_only_if_all_wall_in_view_and_ahead_has_the_verdict_pass() {
+    fn passed_condition_requires_that_all_wall_in_view_and_ahead_passes() {
         let passed = |between: core::ops::Range<i64>, speed_mps: f64, x_m: Option<f64>| {
             let mut coverage = coverage();
             for index in between {

@@ -327,7 +327,7 @@ mod tests {
     /// The first two returns are from a rock. Pings that come while the first one waits take effect when it
     /// is classified.
     #[test]
-    fn lost_ping_after_an_undecided_return_breaks_the_sweep() {
+    fn lost_ping_after_an_undecided_return_interrupts_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {
             let mut bench = Bench::new();
             bench.note(&at(0, 3.0));

@@ -35,7 +35,7 @@ pub(crate) fn state() -> LiveState {
 }
 
 #[test]
-fn lamp_follows_the_ratio_of_speed_to_limit() {
+fn lamp_colour_follows_the_ratio_of_speed_to_v_max() {
     let driven = |speed_mps| LiveState { speed_mps: Some(speed_mps), ..state() };
     let shown = [0.05, 0.0713, 0.073, 0.11, -0.11].map(|mps| {
         let condition = driven(mps).condition();
@@ -81,7 +81,7 @@ fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
 }
 
 #[test]
-fn condition_is_turn_fails_only_while_the_forecast_exceeds_the_target() {
+fn turn_fails_condition_holds_only_while_the_forecast_exceeds_the_target() {
     let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };
     let told = |t_m| LiveState { advice: Some(forecast(t_m)), ..state() }.condition();
     assert_eq!([told(0.6), told(0.4)], [Condition::TurnFails, Condition::Good]);
