@@ -21,7 +21,7 @@ pub(super) const NAMED_OF: u32 = 10;
 /// Causes and required speed of a failed section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Failing {
-    /// Causes assigned to the section.
+    /// Causes of the section's fail.
     pub causes: Causes,
     /// Speed that meets the target in the section, m/s; zero if no speed does.
     pub again_mps: f64,

@@ -86,24 +86,24 @@ impl Cause {
 pub struct Causes(u16);
 
 impl Causes {
-    /// Set of one cause.
+    /// Set that contains one cause.
     pub fn of(cause: Cause) -> Self {
         Self(1 << cause as u16)
     }
 
-    /// This set with a cause added.
+    /// Returns this set with a cause added.
     #[must_use]
     pub fn with(self, cause: Cause) -> Self {
         self.union(Self::of(cause))
     }
 
-    /// This set with a cause removed.
+    /// Returns this set with a cause removed.
     #[must_use]
     pub fn without(self, cause: Cause) -> Self {
         self.less(Self::of(cause))
     }
 
-    /// This set with another set's causes removed.
+    /// Returns this set with the causes of another set removed.
     #[must_use]
     pub fn less(self, other: Self) -> Self {
         Self(self.0 & !other.0)
@@ -125,7 +125,7 @@ impl Causes {
         self.0 & !other.0 == 0
     }
 
-    /// Number of causes.
+    /// Number of causes in the set.
     pub fn len(self) -> u32 {
         self.0.count_ones()
     }
@@ -135,7 +135,7 @@ impl Causes {
         self.0 == 0
     }
 
-    /// The causes, the main one first.
+    /// The causes in the set, the main cause first.
     pub fn iter(self) -> impl Iterator<Item = Cause> {
         Cause::ALL.into_iter().filter(move |cause| self.has(*cause))
     }

@@ -16,7 +16,7 @@ pub struct Evidence {
     pub cause: Cause,
     /// Smallest set of causes without which the section would have passed, with the main cause first.
     pub causes: Causes,
-    /// Speed along the tunnel, m/s.
+    /// Speed of the vehicle along the tunnel, m/s.
     pub speed_mps: f64,
     /// Largest speed that would have met the target from the tunnel's centre, m/s.
     ///
@@ -27,7 +27,7 @@ pub struct Evidence {
     ///
     /// The speed leaves time for the additional passes that replace lost returns.
     pub with_losses_mps: f64,
-    /// Longest time between passes, seconds.
+    /// Longest time between passes of heads over the same wall, seconds.
     pub pass_gap_s: f64,
     /// Longest time between passes if the passes had been evenly spread, seconds.
     pub even_pass_gap_s: f64,

@@ -13,9 +13,9 @@ use headrace_sampling::head::SILENT_AFTER;
 /// Range of chainages in which a head's samples currently land.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reach {
-    /// Least chainage, m.
+    /// Smallest chainage of the reach, m.
     pub from_m: f64,
-    /// Greatest chainage, m.
+    /// Largest chainage of the reach, m.
     pub to_m: f64,
 }
 
@@ -57,7 +57,7 @@ impl HeadReach {
         self.heard = Some(now);
     }
 
-    /// Returns the last known reach.
+    /// Returns the last known reach of the head.
     pub fn latest(&self) -> Reach {
         self.latest
     }

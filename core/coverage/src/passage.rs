@@ -166,7 +166,7 @@ pub enum Loss {
     Missing,
     /// The wall was farther than the range setting.
     OutOfRange,
-    /// The vehicle occluded the beam.
+    /// The vehicle occluded the beam of the ping.
     Occluded,
 }
 

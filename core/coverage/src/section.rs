@@ -46,7 +46,7 @@ impl Verdict {
 /// Count, mean, deviation and extremes of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// Number of values.
+    /// Number of values in the statistics.
     pub count: u32,
     /// Smallest value.
     pub min: f64,
@@ -87,7 +87,7 @@ impl Spread {
         debug_assert!(self.scatter >= 0.0 && self.min <= self.max, "squares have a sum: {self:?}");
     }
 
-    /// Mean; `None` without values.
+    /// Mean of the values; `None` without values.
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then_some(self.mean)
     }
@@ -292,7 +292,7 @@ impl Section {
 pub struct Metres {
     /// Metres that have passed.
     pub pass_m: f64,
-    /// Metres that fail.
+    /// Metres that have failed.
     pub fail_m: f64,
     /// Metres undecided within the error of D.
     pub cannot_say_m: f64,

@@ -27,7 +27,7 @@ use headrace_geometry::tunnel::Profile;
 pub struct Request {
     /// Index of the section, from chainage zero.
     pub section: i64,
-    /// Time of the request.
+    /// Time at which the request was made.
     pub at: MonoNs,
     /// Stretch that every awaited head had swept at this time.
     pub swept_by_all: Option<Reach>,
@@ -96,7 +96,7 @@ pub struct Judging<'a> {
     pub lacks: &'a MissingSamples,
     /// Hole search with its working memory.
     pub finder: &'a mut HoleFinder,
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: &'a Profile,
     /// Function that is called for every run that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),

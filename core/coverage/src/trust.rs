@@ -145,7 +145,7 @@ impl Unchanged {
     }
 }
 
-/// Trust in one head.
+/// State of the trust in one head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct HeadTrust {
     /// Counts of the present half turn, and of the two half turns before.

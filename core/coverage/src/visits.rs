@@ -24,7 +24,7 @@ pub struct Visit {
     pub number: u32,
     /// Number of the visit's stretch of uninterrupted navigation.
     pub tie: u32,
-    /// Time of the sample.
+    /// Time at which the sample was measured.
     pub at: MonoNs,
     /// Error relative to the previous pass, and error relative to a much earlier visit.
     pub errors: [PassError; 2],

@@ -1,4 +1,4 @@
-//! Advice history.
+//! Advice history: speed advice shown during the dive.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -23,14 +23,14 @@ pub struct AdviceEntry {
     pub advice: Advice,
 }
 
-/// Advice history.
+/// Advice history: speed advice shown during the dive.
 ///
 /// An entry is added when the advice has changed significantly, or after ten seconds. When the history is
 /// full, every other entry is dropped and the minimum time between entries is doubled. A longer dive is thus
 /// logged more coarsely from beginning to end.
 #[derive(Debug, Clone, Resource)]
 pub struct AdviceLog {
-    /// The entries, in order.
+    /// Entries of the advice history, in order of time.
     pub entries: Vec<AdviceEntry>,
     /// Number of advice entries dropped for lack of room.
     pub dropped: u64,

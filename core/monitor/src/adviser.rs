@@ -56,7 +56,7 @@ impl Advised {
 #[derive(Debug, Default, Resource)]
 struct AdviceList(Vec<AdviceEntry>);
 
-/// Result stream of the advice.
+/// Result stream of the speed advice.
 #[derive(Debug, Default, Resource)]
 struct AdviceStream(ResultStream);
 
@@ -130,12 +130,12 @@ impl Adviser {
         advised
     }
 
-    /// Copies the state that other parts read.
+    /// Copies the state that other parts of the loop read.
     pub(super) fn report(&self, into: &mut Advised) {
         into.stream.follow(&self.part.world.resource::<AdviceStream>().0);
     }
 
-    /// Advice history.
+    /// History of the speed advice.
     pub fn log(&self) -> &AdviceLog {
         self.part.world.resource()
     }
@@ -297,8 +297,8 @@ mod tests {
         assert_eq!(left_s(Some(100.0), None), [None, None], "the dive hasn't begun");
     }
 
-    /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, heads 0.8 m apart
-    /// reach the same place 8 s after one another.
+    /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, the rear one of
+    /// two heads 0.8 m apart reaches a place 8 s after the front one.
     #[test]
     fn vehicle_rotation_spans_the_time_between_passes_and_between_heads_along_the_hull() {
         let swung = |apart_m: f64, speed_mps: f64| {
@@ -313,7 +313,7 @@ mod tests {
             }
             last
         };
-        // The tolerance is one update.
+        // The tolerance is one advice update (0.2 s).
         let near = |found: f64, expected: f64| (found - expected).abs() < 0.05 * expected;
         for (apart_m, speed_mps) in [(0.8, 0.1), (0.8, -0.1), (0.8, 0.2)] {
             let found = swung(apart_m, speed_mps);
@@ -327,7 +327,7 @@ mod tests {
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }
 
-    /// All other resources and components are constant after arming, or are set anew in each tick.
+    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let (_, adviser) = armed().split().unwrap();

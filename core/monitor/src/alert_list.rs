@@ -97,7 +97,7 @@ pub struct Acknowledgement {
 /// Figures with which an alert's texts are made.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Figures {
-    /// No figures.
+    /// The alert has no figures.
     None,
     /// Missed stretch: causes, arc length of the largest hole, m, and the speed advised when the alert was
     /// raised, m/s.
@@ -137,7 +137,7 @@ pub struct ListedAlert {
     pub rectified: Option<MonoNs>,
     /// Time at which the alert ended.
     pub cleared: Option<MonoNs>,
-    /// Acknowledgement, if any.
+    /// Acknowledgement of the alert, if any.
     pub acknowledged: Option<Acknowledgement>,
     /// Time until which the alert's sound is silenced.
     pub silenced_until: Option<MonoNs>,
@@ -145,7 +145,7 @@ pub struct ListedAlert {
     pub source: Option<SourceId>,
     /// Index of the missed stretch's first section, and index after its last section.
     pub stretch: Option<(i64, i64)>,
-    /// Place of the vehicle when the alert was raised, m; `None` for an alert with a stretch.
+    /// Chainage of the vehicle when the alert was raised, m; `None` for an alert with a stretch.
     pub x_m: Option<f64>,
     /// Number of times that the alert was raised. For missed stretches: number of stretches that the alert
     /// represents.

@@ -1,5 +1,5 @@
-//! The alerter: combines the values of the other parts and the operator's commands into the live state,
-//! alerts and notes.
+//! The alerter: combines the results of the other parts of the loop and the operator's commands into the live
+//! state, alerts and notes.
 
 use super::adviser::Advised;
 use super::alert_list::{AlertList, Beat, MOST_LISTED, RunInput, Telling};

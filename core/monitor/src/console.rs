@@ -33,7 +33,7 @@ const TIME_EVERY: DurNs = DurNs(500_000_000);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConsoleError {
-    /// Too many commands are waiting.
+    /// Too many commands are waiting for the loop.
     #[error("sending a command to the loop: {MOST_WAITING} are waiting already; send it again")]
     Full,
     /// The dive already has as many notes as its report can hold.
@@ -52,7 +52,7 @@ pub struct ConsolePort {
     notes: Arc<AtomicUsize>,
 }
 
-/// Clock of a dive's timestamps.
+/// Clock that gives the timestamps of a dive.
 type DiveClock = dyn Fn() -> MonoNs + Send + Sync;
 
 impl ConsolePort {

@@ -27,7 +27,7 @@ impl Digest {
         self.integer((value + 0.0).to_bits())
     }
 
-    /// The digest so far.
+    /// The digest of all numbers so far.
     pub fn value(&self) -> u64 {
         self.0
     }

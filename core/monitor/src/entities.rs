@@ -31,7 +31,7 @@ use headrace_sensor::reading::SourceId;
 /// The vehicle's navigation: converts readings to fixes.
 #[derive(Component)]
 pub struct Navigator {
-    /// Navigation method.
+    /// Method that computes fixes from readings.
     pub navigation: Box<dyn Navigation>,
     /// Time of the next update, a multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
@@ -109,7 +109,7 @@ pub struct SensorHealth {
     pub readings: u64,
     /// Receive times of the first and last packet.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// Longest time between two packets.
+    /// Longest time between two packets of the sensor.
     pub longest_gap: DurNs,
 }
 
@@ -150,7 +150,7 @@ pub struct HeadSpecification {
     /// Shortest range setting that reaches all wall from the tunnel's centre, m, and the head's modes at that
     /// setting.
     ///
-    /// The setting is the head's own or a longer one. `None` if no setting is long enough.
+    /// The setting is the head's present one or a longer one. `None` if no setting is long enough.
     pub reaching: Option<(f64, Vec<HeadMode>)>,
 }
 
@@ -174,7 +174,7 @@ pub struct HeadClassifier(pub(super) HeadWall);
 pub struct HeadSweep {
     /// Last valid sample in the present sweep of the head.
     pub(super) last: Option<LastSample>,
-    /// Returns that wait for the next ones before they are classified.
+    /// Returns that are classified only after the head's next returns.
     pub(super) waiting: WaitingReturns,
 }
 
@@ -182,7 +182,7 @@ pub struct HeadSweep {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Waiting {
     pub(super) ping: PlacedPing,
-    /// Whether the next ping gave no return.
+    /// Whether the ping after this return gave no return.
     pub(super) broken: bool,
     /// Whether a new sweep has begun since this return.
     pub(super) new_sweep: bool,

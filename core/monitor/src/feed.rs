@@ -5,7 +5,7 @@ use headrace_geometry::time::MonoNs;
 
 /// Packet source that fills the rings of a loop: ports, a log, or a simulation.
 pub trait Feed {
-    /// Error that ends the feed.
+    /// Type of the error that ends the feed.
     type Error;
 
     /// Waits for the next tick and fills the rings for it. Returns the end of the tick's time; `None` at the

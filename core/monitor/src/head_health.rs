@@ -62,7 +62,7 @@ impl SameRange {
     }
 }
 
-/// A return of a head.
+/// A return of a head, compared with the design.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heard {
     /// Range that the head reports, m.
@@ -145,7 +145,7 @@ mod tests {
         let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
         assert!(!from_500(890).is_deaf(std::iter::empty()));
         assert!(from_500(901).is_deaf(std::iter::empty()));
-        // A single return ends deafness.
+        // A single return ends the head's deafness.
         let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
         assert!(!heard_again.is_deaf(std::iter::empty()));
         // Three quarters of each turn give no return, as beside a side tunnel or an absorbing wall.

@@ -79,7 +79,7 @@ pub enum LiveMessage {
     },
     /// A note was added.
     Note(NoteJson),
-    /// Present coverage extent.
+    /// The coverage extent at present, with its metres by verdict.
     Way {
         /// Beginning of the extent.
         from_m: f64,
@@ -115,7 +115,7 @@ pub struct LiveMessages {
     played: Option<MonoNs>,
 }
 
-/// Sections reported as missed: index of the first one that ever failed, and index after the last one.
+/// A reported miss: index of the first section that ever failed, and index after the last one.
 #[derive(Debug, Clone, Copy)]
 struct ReportedMiss {
     run: RunId,

@@ -64,7 +64,7 @@ pub enum PositionState {
 }
 
 impl PositionState {
-    /// Word used in JSON: `none`, `doubtful` or `ok`.
+    /// Word used for the availability in JSON: `none`, `doubtful` or `ok`.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::None(_) => "none",
@@ -86,11 +86,11 @@ impl PositionState {
 /// Metres of the coverage extent by verdict. Their sum is the extent.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LiveMetres {
-    /// Metres that pass.
+    /// Metres of sections that pass.
     pub pass_m: f64,
-    /// Metres that fail.
+    /// Metres of sections that fail.
     pub fail_m: f64,
-    /// Metres without a verdict of pass or fail.
+    /// Metres of sections without a verdict of pass or fail.
     pub cannot_say_m: f64,
     /// Metres still open: further driving may fill their holes.
     pub open_m: f64,
@@ -124,9 +124,9 @@ pub const LEAST_MPS: f64 = 0.005;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorState {
-    /// No reading so far.
+    /// No reading has arrived so far.
     Never,
-    /// No reading for longer than [`OLD_AFTER`].
+    /// No reading has arrived for longer than [`OLD_AFTER`].
     Silent,
     /// A head whose readings all come from one angle.
     Stalled,
@@ -136,7 +136,7 @@ pub enum SensorState {
     Hung,
     /// A head that is distrusted.
     Distrusted,
-    /// Readings arrive.
+    /// The sensor's readings arrive.
     Ok,
 }
 
@@ -168,7 +168,7 @@ pub struct LiveState {
     pub chainage_m: Option<f64>,
     /// Standard deviations of the pose; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
-    /// Standard deviation of the position of one pass relative to the next.
+    /// Standard deviation of the position at one pass of a head relative to the next pass.
     pub pass_sd_m: f64,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if that isn't needed.
     ///
@@ -206,7 +206,7 @@ pub struct LiveState {
     pub deaf: u64,
     /// Bitmask of the sources that repeat a reading.
     pub hung: u64,
-    /// Number of sources.
+    /// Number of sources of the dive.
     pub sources: u16,
     /// Receive time of each source's last reading.
     pub heard: [Option<MonoNs>; MAX_SOURCES],

@@ -11,7 +11,7 @@ use headrace_coverage::Verdict;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
-/// A line for the pilot.
+/// A line of text for the pilot.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PilotLine {
     /// Place: one stationing, or two for a stretch.
@@ -254,7 +254,7 @@ pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
     if part_m <= 0.0 || part_m > whole_m - 1e-6 { String::new() } else { format!(", {part_m:.2} m of it") }
 }
 
-/// Line for a live message.
+/// Line of text for a live message.
 pub fn message_line(told: &LiveMessage, profile: &Profile, heads: &HeadDescriptions) -> PilotLine {
     let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
         place,

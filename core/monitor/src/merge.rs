@@ -8,7 +8,7 @@ use headrace_sensor::reading::{MAX_SOURCES, Packet, SourceId};
 
 /// Maximum number of packets per tick. Further packets wait for the next tick.
 pub const MAX_TICK_PACKETS: usize = 4096;
-/// Maximum bytes per tick.
+/// Maximum bytes of packets per tick.
 pub const MAX_TICK_BYTES: usize = 256 * 1024;
 
 /// Packets of the current tick, in the order of consumption.
@@ -44,7 +44,7 @@ impl Inbox {
         self.bytes.len()
     }
 
-    /// Packets in order.
+    /// Packets of the tick, in order.
     pub fn iter(&self) -> impl Iterator<Item = (SourceId, Packet<'_>)> {
         self.packets.iter().map(|packet| {
             let bytes = self.bytes.get(packet.from..packet.to).unwrap_or_default();
@@ -52,12 +52,12 @@ impl Inbox {
         })
     }
 
-    /// Number of packets.
+    /// Number of packets of the tick.
     pub fn len(&self) -> usize {
         self.packets.len()
     }
 
-    /// Whether there are no packets.
+    /// Whether the tick has no packets.
     pub fn is_empty(&self) -> bool {
         self.packets.is_empty()
     }

@@ -65,11 +65,11 @@ pub enum Outcome {
 /// Whether the vehicle occludes a beam, according to the vehicle's geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Hidden {
-    /// Not occluded.
+    /// The beam is not occluded.
     No,
     /// The beam passes close to the vehicle. A return is possible.
     Beside,
-    /// Occluded.
+    /// The beam is occluded.
     Yes,
 }
 
@@ -135,9 +135,9 @@ pub struct Update {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "the list is filled once and read once per tick")]
 pub enum Placement {
-    /// A ping.
+    /// A placed ping.
     Ping(PlacedPing),
-    /// An update.
+    /// An advice update.
     Update(Update),
 }
 
@@ -188,7 +188,7 @@ pub enum Notice {
         /// Kind of the run's change.
         change: RunChange,
     },
-    /// Speed advice.
+    /// Speed advice at an update.
     Advice(AdviceEntry),
     /// An alert of the list has changed.
     Listed {

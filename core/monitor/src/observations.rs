@@ -89,12 +89,12 @@ pub(crate) struct Observation {
     setting: Option<SettingDoubt>,
 }
 
-/// All observations of a dive.
+/// All observations of a dive, by kind and head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
 pub(crate) struct Observations([Option<Observation>; MOST_OBSERVATIONS]);
 
 impl Observations {
-    /// Records an occurrence at a chainage with its deviation, m. Returns true for the first one.
+    /// Records an occurrence at a chainage with its deviation, m. Returns true for the first occurrence.
     pub(crate) fn note(&mut self, kind: ObservedKind, at: MonoNs, x_m: f64, off_m: f64) -> bool {
         self.note_of(None, kind, at, x_m, off_m)
     }
@@ -164,7 +164,7 @@ impl Observations {
         self.0.iter_mut().flatten().find(|known| known.kind == kind && known.source == source)
     }
 
-    /// All observations.
+    /// All observations made so far.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Observation> {
         self.0.iter().flatten()
     }

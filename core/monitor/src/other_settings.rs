@@ -153,7 +153,7 @@ mod tests {
         assert!((roomy.finer_step - 0.375).abs() < 1e-9 && (roomy.finer_turn - 8.0 / 4.8).abs() < 1e-9);
         let close = at(0.1);
         assert!((close.finer_step - 0.25).abs() < 1e-9 && (close.finer_turn - 10.8 / 4.8).abs() < 1e-9);
-        // No mode meets the target, so the finest one is chosen.
+        // No mode meets the target, so the mode with the finest step is chosen.
         assert_eq!(at(0.01), close);
         let finest = of_head(&head(0.6, None), 6.0, 0.2);
         assert_eq!((finest.finer_step, finest.finer_turn, finest.longer_turn), (1.0, 1.0, 1.0));

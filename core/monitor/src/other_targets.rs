@@ -8,7 +8,7 @@ use super::run::Loop;
 /// Metres by verdict, for another target or another section length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OtherTargetReport {
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,

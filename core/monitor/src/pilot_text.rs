@@ -37,7 +37,7 @@ pub fn clock_text(profile: &Profile, arc_m: f64) -> String {
 pub struct CauseFigures {
     /// Causes that together explain the failed section.
     pub causes: Causes,
-    /// Speed along the tunnel, m/s.
+    /// Speed of the vehicle along the tunnel, m/s.
     pub speed_mps: f64,
     /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
@@ -178,7 +178,7 @@ pub fn actions_text(
     others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second, heads)))
 }
 
-/// Text of an action that follows another one.
+/// Text of an action that follows another action in a sentence.
 fn short_text(action: Action, heads: &HeadDescriptions) -> String {
     let text = match action {
         Action::Slower => "slower",
@@ -284,7 +284,7 @@ pub struct Missed {
     pub figures: CauseFigures,
     /// Arc length of the stretch's largest hole, m.
     pub hole_arc_m: f64,
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Speed advised now, m/s; zero if none is advised.
     pub v_max_mps: f64,
@@ -307,7 +307,7 @@ pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// Text of an observation that a log has in `judgements`; `None` if no kind has this number.
+/// Text of an observation that a log has in `judgements`; `None` if no kind of observation has this number.
 ///
 /// `x_m` is the chainage, m; `off_m` the deviation, m; `head` the head or velocity log, if it names one.
 pub fn recorded_observation_text(kind: u64, head: &str, x_m: f64, off_m: f64) -> Option<String> {
@@ -375,7 +375,7 @@ pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String
 /// Figures for the text of an advice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AdviceFigures {
-    /// Present speed, m/s.
+    /// Present speed of the vehicle, m/s.
     pub speed_mps: f64,
     /// Largest speed that meets the target, m/s; zero if there is none.
     pub v_max_mps: f64,

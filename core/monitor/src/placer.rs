@@ -197,7 +197,7 @@ impl Placer {
         core::mem::swap(&mut *world.resource_mut::<Commands>(), &mut with.commands);
     }
 
-    /// Copies the state that other parts read.
+    /// Copies the state that other parts of the loop read.
     pub(super) fn report(&self, into: &mut Placed) {
         let world = &self.part.world;
         let entities = world.resource::<VehicleEntities>();
@@ -213,7 +213,7 @@ impl Placer {
         self.readers.iter().any(|reader| reader.peek().is_some())
     }
 
-    /// Copies the state of another loop's placer.
+    /// Copies the state of the placer of another loop.
     ///
     /// Errors: the other placer has other sensors or another navigation. This placer must not be used
     /// afterwards.
@@ -237,7 +237,7 @@ impl Placer {
         }
     }
 
-    /// Navigation of the vehicle.
+    /// Navigation state of the vehicle.
     pub(super) fn navigation(&self) -> &dyn Navigation {
         let vehicle = self.part.world.entity(self.part.world.resource::<VehicleEntities>().vehicle);
         #[expect(clippy::expect_used, reason = "arming adds it, and nothing removes it")]
@@ -255,7 +255,7 @@ impl Placer {
         self.part.world.resource::<SoundSpeed>().span_mps()
     }
 
-    /// A resource of a plugin.
+    /// A resource that a plugin has added.
     pub fn resource<T: Resource>(&self) -> Option<&T> {
         self.part.resource()
     }
@@ -281,7 +281,7 @@ mod tests {
     use crate::fixtures::armed;
     use crate::resources::{Target, TunnelDesign};
 
-    /// All other resources and components are constant after arming, or are set anew in each tick.
+    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let (placer, _) = armed().split().unwrap();

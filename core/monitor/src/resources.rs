@@ -20,7 +20,7 @@ use headrace_sampling::layout::HeadLayout;
 /// The tunnel as designed, and the water in it.
 #[derive(Debug, Clone, Resource)]
 pub struct TunnelDesign {
-    /// Design profile.
+    /// Design profile of the tunnel's cross-section.
     pub profile: Profile,
     /// Water properties, gravity and levels of the site.
     pub site: Site,
@@ -56,7 +56,7 @@ impl TunnelDesign {
 /// Coverage target, and the settings that affect whether it is met.
 #[derive(Debug, Clone, Copy, Resource)]
 pub struct Target {
-    /// Target T, m.
+    /// Target T: the largest hole allowed, m.
     pub target_m: f64,
     /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,

@@ -23,7 +23,7 @@ pub enum RecordKind {
     Run = 4,
     /// Speed advice.
     Advice = 5,
-    /// A pose of the vehicle.
+    /// A pose of the vehicle at an update.
     Pose = 6,
     /// An update without a fix.
     NoPose = 7,
@@ -31,11 +31,11 @@ pub enum RecordKind {
     Alert = 8,
     /// A ping whose return was not accepted as wall.
     Doubtful = 9,
-    /// The live state.
+    /// The live state at an update.
     State = 10,
     /// A change of an alert of the list.
     AlertChange = 11,
-    /// A note.
+    /// A note of the crew.
     Note = 12,
     /// A voice note. The record is repeated once the note's recording is in the log.
     Voice = 13,

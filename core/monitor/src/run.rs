@@ -46,7 +46,7 @@ pub struct Loop {
     ahead: Option<(Placer, Adviser)>,
     surveyor: Surveyor,
     alerter: Alerter,
-    /// Values of the last tick.
+    /// Results of placer and adviser for the last tick.
     placed: Arc<Placed>,
     advised: Advised,
     outlets: Vec<Box<dyn Outlet>>,

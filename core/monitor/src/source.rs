@@ -6,7 +6,7 @@ use headrace_sensor::device::Decoder;
 pub struct SourceSpec {
     /// Name of the source, and of its channel in the log.
     pub id: String,
-    /// Kind of device.
+    /// Kind of device that the source is.
     pub plugin: String,
     /// Connection of the source, as written in the vehicle file.
     pub connect: String,

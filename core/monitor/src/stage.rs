@@ -13,9 +13,9 @@ pub trait Stage: SystemSet + Copy + PartialEq {
 /// Stages of the placer: from packets to placed pings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum PlaceStage {
-    /// Converts bytes to readings.
+    /// Converts the bytes of sensor packets to readings.
     Decode,
-    /// Converts readings to fixes.
+    /// Converts readings to fixes of the vehicle.
     Navigate,
     /// Converts returns to points on the wall.
     Georeference,
@@ -53,7 +53,7 @@ impl Stage for SurveyStage {
     const ALL: &'static [Self] = &[Self::Classify, Self::Walk, Self::Judge, Self::Report, Self::Surveyed];
 }
 
-/// Stage of the adviser.
+/// The only stage of the adviser.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum AdviseStage {
     /// Computes the speed advice at each update.

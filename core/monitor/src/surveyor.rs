@@ -115,7 +115,7 @@ impl Surveyor {
         self.part.world.resource()
     }
 
-    /// Coverage of the wall.
+    /// Coverage of the wall, with samples and verdicts.
     pub fn coverage(&self) -> &Coverage {
         self.part.world.resource()
     }
@@ -135,7 +135,7 @@ impl Surveyor {
         self.part.world.resource()
     }
 
-    /// A resource of a plugin.
+    /// A resource that a plugin has added.
     pub fn resource<T: Resource>(&self) -> Option<&T> {
         self.part.resource()
     }
@@ -198,7 +198,7 @@ mod tests {
     use crate::fixtures::armed;
     use crate::resources::{Target, TunnelDesign};
 
-    /// All other resources and components are constant after arming, or are set anew in each tick.
+    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let dive = armed();

@@ -69,8 +69,8 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
     }
 }
 
-/// Ratios of a speed to the fitting speed, which is the largest one that meets the target. Between the two
-/// ratios, the speed counts as equal to the fitting speed.
+/// Lower and upper ratio of a speed to the fitting speed, which is the largest one that meets the target.
+/// Between the two ratios, the speed counts as equal to the fitting speed.
 const AS_FITS: [f64; 2] = [0.98, 1.02];
 
 /// Text of the remedy for an unsure stretch; empty if there is none.

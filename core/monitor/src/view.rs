@@ -69,7 +69,7 @@ impl<'a> DiveView<'a> {
         self.placed
     }
 
-    /// The surveyor.
+    /// The surveyor after the tick.
     pub fn surveyor(&self) -> &'a Surveyor {
         self.surveyor
     }
@@ -106,7 +106,7 @@ impl<'a> DiveView<'a> {
         found.chain(advised).chain(self.alerter.notices.iter().copied())
     }
 
-    /// Coverage of the wall.
+    /// Coverage of the wall, with samples and verdicts.
     pub fn coverage(&self) -> &'a Coverage {
         self.surveyor.coverage()
     }

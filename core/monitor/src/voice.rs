@@ -67,7 +67,7 @@ pub struct Voice {
     pub seconds: u32,
     /// Container format of the audio.
     pub container: Container,
-    /// Contents of the audio file.
+    /// Contents of the recording's audio file.
     pub audio: Vec<u8>,
 }
 
@@ -75,7 +75,7 @@ pub struct Voice {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VoiceError {
-    /// The id is 0.
+    /// The id of the recording is 0.
     #[error("a voice note has the id 0; expected 1 to 4294967295")]
     Id,
     /// The recording is too long or too short.

@@ -267,7 +267,8 @@ fn warning(key: String, problem: String) -> Finding {
     Finding { grade: Grade::Warning, key, problem }
 }
 
-/// Names the end (port, address, interface or device) that two connections share; `None` if they lead to different ends.
+/// Names the end (port, address, interface or device) that two connections share. `None` if they lead to
+/// different ends.
 fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
     match (a, b) {
         (Connect::Serial { port: a, .. }, Connect::Serial { port: b, .. }) => {

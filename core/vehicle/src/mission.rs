@@ -13,13 +13,13 @@ use crate::coverage::CoverageConfig;
 /// Mission parameters of a dive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
-    /// Design profile.
+    /// Design profile of the tunnel's cross-section.
     pub profile: Profile,
     /// Water properties, gravity and levels of the site.
     pub site: Site,
     /// Depth sensor whose temperature determines the speed of sound, instead of the site's value.
     pub sound_speed_from: Option<String>,
-    /// Target T, m.
+    /// Target T: the largest hole allowed, m.
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
@@ -37,7 +37,7 @@ pub struct Mission {
     pub looks: Looks,
     /// Time limit of the dive, counted from the first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
-    /// Timing of alerts by class.
+    /// Delays of alerts by alert class.
     pub alerts: AlertTiming,
     /// Limits of cable length and dive time.
     pub limits: LimitsConfig,

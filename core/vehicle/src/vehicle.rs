@@ -51,9 +51,9 @@ pub struct VehicleConfig {
     pub navigation: NavigationConfig,
     /// Resolution and recast interval of the rays that locate the wall for the speed advice.
     pub looks: Looks,
-    /// Time limit of the dive.
+    /// Maximum duration of the dive.
     pub dive_time: Option<DurNs>,
-    /// Timing of alerts by class.
+    /// Delays of alerts by alert class.
     pub alerts: AlertTiming,
     /// Limits of cable length and dive time.
     pub limits: LimitsConfig,

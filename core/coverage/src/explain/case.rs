@@ -35,7 +35,7 @@ pub struct Case<'a> {
     pub is_dark: bool,
     /// Whether the section's samples come from unrelated stretches of navigation.
     pub is_torn: bool,
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Causes of the two neighbouring sections. Among equally small sets of causes, the search prefers these.
     pub beside: [Causes; 2],

@@ -12,7 +12,7 @@ const FINE_M: f64 = 1e-3;
 pub struct Needed<'a> {
     /// Required radius at an arc length, m.
     pub radius_m: &'a dyn Fn(f64) -> f64,
-    /// Largest required radius, m.
+    /// Largest required radius at any arc length, m.
     pub most_m: f64,
     /// Largest change of the required radius with arc length, m/m.
     pub slope: f64,

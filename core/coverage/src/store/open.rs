@@ -78,7 +78,7 @@ pub(super) struct OpenBricks {
 stateful!(OpenBricks { state: free, used; lists: nodes; slots: cells, rows_seen, chains, bricks; fixed: rows, columns, most_nodes; });
 
 impl OpenBricks {
-    /// Allocates: at startup only.
+    /// Creates a pool without open bricks. Allocates: at startup only.
     pub(super) fn new(slots: usize, (rows, columns): (usize, usize), most_nodes: usize) -> Self {
         Self {
             rows,

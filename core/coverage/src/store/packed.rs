@@ -9,7 +9,7 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_sampling::head::MAX_HEADS;
 
-/// Quanta per metre.
+/// Number of quanta per metre.
 const QUANTA_PER_M: f64 = 131_072.0;
 /// Maximum displacement of a sample by packing, m.
 ///
@@ -128,12 +128,12 @@ impl Stateful for Arena {
 }
 
 impl Arena {
-    /// Allocates: at startup only.
+    /// Creates an arena of blocks. Allocates: at startup only.
     pub(super) fn new(most_blocks: usize) -> Self {
         Self { blocks: Vec::with_capacity(most_blocks), most: most_blocks, free: 0, used: 0 }
     }
 
-    /// Number of free words.
+    /// Number of free words in the arena.
     pub(super) fn free_words(&self) -> usize {
         (self.most - self.used) * ROOM
     }
@@ -167,7 +167,7 @@ impl Arena {
         self.blocks.get_mut(link.checked_sub(1)? as usize)
     }
 
-    /// Frees a chain of blocks.
+    /// Frees a chain of blocks of a brick.
     pub(super) fn release(&mut self, first: u32) {
         let mut link = first;
         let free = self.free;
@@ -191,7 +191,7 @@ impl Arena {
     }
 }
 
-/// Writer of a packed brick.
+/// Writer of the samples of a packed brick.
 pub(super) struct Writer<'a> {
     arena: &'a mut Arena,
     lattice: Lattice,

@@ -214,7 +214,7 @@ impl AlertList {
         let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
         let is_silent =
             |source: u16| matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent);
-        // If no sensor delivers data, that is one situation, not one for each sensor.
+        // If no sensor delivers data, that is a single situation with one alert, not one per sensor.
         let all_silent = state.sources > 0 && sources().all(is_silent);
         self.observe(at, &Seen::of(ListKind::NoData, all_silent, Figures::None), to);
         // A sensor is silent if it delivers nothing while another one does.

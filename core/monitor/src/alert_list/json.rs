@@ -22,11 +22,11 @@ const RECENT: usize = 20;
 /// An alert in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ListedAlertJson {
-    /// Number from 1; never reused.
+    /// Number of the alert, from 1; never reused.
     pub number: u32,
-    /// `emergency_alarm`, `alarm`, `warning` or `caution`.
+    /// Priority: `emergency_alarm`, `alarm`, `warning` or `caution`.
     pub priority: &'static str,
-    /// `coverage`, `speed`, `position`, `sensor`, `recording` or `setting`.
+    /// Class: `coverage`, `speed`, `position`, `sensor`, `recording` or `setting`.
     pub class: &'static str,
     /// Kind of the alert.
     pub kind: &'static str,
@@ -34,7 +34,7 @@ pub struct ListedAlertJson {
     pub text: String,
     /// Action to take; empty if there is none.
     pub advice: String,
-    /// `active`, `rectified` or `cleared`.
+    /// State: `active`, `rectified` or `cleared`.
     pub state: AlertState,
     /// Time at which the alert was first raised, seconds on the log's clock.
     pub since_s: f64,
@@ -42,15 +42,15 @@ pub struct ListedAlertJson {
     pub rectified_s: Option<f64>,
     /// Time at which the alert ended, seconds on the log's clock.
     pub cleared_s: Option<f64>,
-    /// Acknowledgement, if any.
+    /// Acknowledgement of the alert, if any.
     pub acknowledged: Option<AcknowledgedJson>,
     /// Time until which the alert's sound is silenced, seconds on the log's clock.
     pub silenced_until_s: Option<f64>,
-    /// Whether the alert sounds now.
+    /// Whether the alert's sound is on now.
     pub sounds: bool,
     /// Whether somebody must still acknowledge the alert.
     pub needs_acknowledgement: bool,
-    /// Beginning of the alert's stretch, or place of the vehicle when the alert was raised, m.
+    /// Beginning of the alert's stretch, or chainage of the vehicle when the alert was raised, m.
     pub from_m: Option<f64>,
     /// End of the alert's stretch, m.
     pub to_m: Option<f64>,
@@ -107,9 +107,9 @@ pub struct AcknowledgedJson {
 /// Counts of alerts that have not ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct AlertCountsJson {
-    /// Alerts that somebody must still acknowledge.
+    /// Number of alerts that somebody must still acknowledge.
     pub unacknowledged: u32,
-    /// Alerts whose condition holds.
+    /// Number of alerts whose condition holds.
     pub active: u32,
     /// Number of emergency alarms that have not ended.
     pub emergency_alarm: u32,

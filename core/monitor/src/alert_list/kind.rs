@@ -9,13 +9,13 @@ pub use headrace_vehicle::AlertClass;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Priority {
-    /// For information; needs no acknowledgement.
+    /// Caution: for information; needs no acknowledgement.
     Caution,
-    /// The situation needs attention before it becomes worse.
+    /// Warning: the situation needs attention before it becomes worse.
     Warning,
-    /// The situation needs action now.
+    /// Alarm: the situation needs action now.
     Alarm,
-    /// The vehicle may be lost.
+    /// Emergency alarm: the vehicle may be lost.
     EmergencyAlarm,
 }
 

@@ -113,8 +113,8 @@ impl AlertList {
             self.share_one(at, to);
         }
         let oldest = self.alerts.iter().position(|alert| !alert.is_live());
-        // If all alerts are live, most of them are missed stretches, because the list has far more entries
-        // than there are other situations.
+        // If all alerts in a full list are live, most of them are missed stretches, because there are far
+        // fewer other situations.
         let oldest =
             oldest.or_else(|| self.alerts.iter().position(|alert| alert.priority == Priority::Caution));
         if let Some(oldest) = oldest {

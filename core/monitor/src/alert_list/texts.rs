@@ -1,5 +1,5 @@
-//! Texts of alerts, from the same table as the pilot's other lines. Allocates: outlets only, never within a
-//! tick.
+//! Texts of alerts, from the same table of words as the pilot's other messages. Allocates: outlets only,
+//! never within a tick.
 
 use super::{AlertState, Figures, ListKind, ListedAlert, Occurrences};
 use crate::head_descriptions::HeadDescriptions;
@@ -19,9 +19,9 @@ pub struct TextContext<'a> {
     pub sources: &'a [SourceInfo],
     /// Tunnel profile, for clock positions.
     pub profile: &'a Profile,
-    /// Length of a section, m.
+    /// Length of a tunnel section, m.
     pub section_m: f64,
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Confidence: number of standard deviations by which a hole's size must clear the target for a verdict.
     pub confidence_sd: f64,

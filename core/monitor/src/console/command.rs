@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// Longest command packet, bytes.
 pub const MAX_COMMAND_BYTES: usize = 512;
-/// Longest note, bytes.
+/// Longest text of a note, bytes.
 pub const MAX_NOTE_BYTES: usize = 240;
 
 /// Author of a command: initials, a name, or a device.
@@ -32,14 +32,14 @@ pub enum Command {
         /// Person or device that silences the alerts.
         by: Who,
     },
-    /// Adds a note at the present place.
+    /// Adds a note with the vehicle's present chainage.
     Note {
         /// Text of the note; empty for a mark.
         text: NoteText,
         /// Author of the note.
         by: Who,
     },
-    /// Adds a voice note at the present place, when its recording begins.
+    /// Adds a voice note with the vehicle's present chainage, when its recording begins.
     Voice {
         /// Id that ties the note to its recording; never 0.
         id: u32,
@@ -55,7 +55,7 @@ pub enum Command {
     },
     /// Sent by the program: a log recording fails, or works again.
     Recording {
-        /// Whether a recording fails.
+        /// Whether a log recording fails at present.
         fails: bool,
     },
     /// Sent by other equipment: remaining battery charge of the vehicle.
@@ -96,7 +96,8 @@ struct Values {
 }
 
 impl Command {
-    /// Whether an operator may send this command. Only the program sends the others.
+    /// Whether an operator may send this command. All other commands are sent by the program or other
+    /// equipment only.
     pub fn is_operators(&self) -> bool {
         matches!(
             self,

@@ -1,4 +1,4 @@
-//! Short texts stored inline.
+//! Short texts stored inline, without allocation.
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -46,7 +46,7 @@ impl<const BYTES: usize> ShortText<BYTES> {
     /// The text as a string slice.
     pub fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..usize::from(self.len)).unwrap_or_default();
-        // Only whole characters are appended.
+        // The buffer is valid UTF-8, because only whole characters are appended.
         core::str::from_utf8(bytes).unwrap_or_default()
     }
 }

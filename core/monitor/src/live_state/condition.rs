@@ -53,20 +53,20 @@ pub enum Condition {
     Good,
 }
 
-/// Colour of the lamp for a condition.
+/// Colour of the lamp that shows how serious a condition is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Lamp {
-    /// Continue: all is well.
+    /// Green: the pilot can continue, all is well.
     Green,
-    /// Take care.
+    /// Amber: the pilot should take care.
     Amber,
-    /// Act now.
+    /// Red: the pilot must act now.
     Red,
 }
 
 impl Condition {
-    /// Word used for the colour in JSON.
+    /// Word used for the condition in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::NoData => "no_data",
@@ -86,7 +86,7 @@ impl Condition {
         }
     }
 
-    /// Colour of the condition.
+    /// Colour of the lamp for the condition.
     pub fn lamp(self) -> Lamp {
         match self {
             Self::Good | Self::Passed | Self::GoingBack(_) => Lamp::Green,

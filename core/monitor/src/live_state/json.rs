@@ -58,10 +58,10 @@ pub struct LiveStateJson {
     pub alerts_hidden: usize,
 }
 
-/// A position.
+/// Position of the vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PositionJson {
-    /// `ok`, `doubtful` or `none`.
+    /// State of the position: `ok`, `doubtful` or `none`.
     pub state: &'static str,
     /// Reason for which the position is doubtful or missing.
     ///
@@ -76,9 +76,10 @@ pub struct PositionJson {
     pub chainage_sd_m: Option<f64>,
     /// Standard deviation of the vehicle's place in the cross-section, m.
     pub place_sd_m: Option<f64>,
-    /// Standard deviation of yaw, degrees.
+    /// Standard deviation of the vehicle's yaw, degrees.
     pub yaw_sd_deg: Option<f64>,
-    /// Standard deviation of the position of one pass relative to the next, m; `None` without a position.
+    /// Standard deviation of the position at one pass of a head relative to the next pass, m; `None` without
+    /// a position.
     pub pass_sd_m: Option<f64>,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if that isn't needed.
     pub stand_s: u32,
@@ -94,7 +95,8 @@ pub struct MarginsJson {
     pub turn_m: Option<f64>,
     /// Part of the target used up by position errors, m.
     ///
-    /// This is the confidence times the standard deviation of one pass relative to the next.
+    /// It is the confidence times the standard deviation of the position at one pass relative to the next
+    /// pass.
     pub position_m: Option<f64>,
     /// Share of lost returns; `None` unless they limit the speed.
     pub lost_share: Option<f64>,
@@ -103,7 +105,7 @@ pub struct MarginsJson {
 /// Forecast of the present turn at the present speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TurnJson {
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Forecast spacing T, m; `None` if it is unbounded.
     pub predicted_t_m: Option<f64>,

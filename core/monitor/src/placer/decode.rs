@@ -1,4 +1,4 @@
-//! Converts bytes to readings.
+//! Converts the bytes of sensor packets to readings.
 
 use bevy_ecs::prelude::{Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;

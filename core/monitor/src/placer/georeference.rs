@@ -66,7 +66,7 @@ pub(super) fn georeference(
     }
 }
 
-/// Places a head's ping.
+/// Georeferences a head's ping.
 fn place(
     event: &Event,
     sonar: &SonarReturn,

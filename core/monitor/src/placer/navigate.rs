@@ -1,4 +1,4 @@
-//! Converts readings to fixes.
+//! Converts sensor readings to fixes of the vehicle.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::{Query, Res, ResMut, Resource, Single};
@@ -147,7 +147,7 @@ mod tests {
             (1.199, None),
             (1.2, Some(1.2)),
             (1.21, None),
-            // Time goes back, then catches up.
+            // Time on the packets' clock goes back, then catches up.
             (0.3, None),
             (1.39, None),
             (1.43, Some(1.4)),

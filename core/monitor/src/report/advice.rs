@@ -1,4 +1,4 @@
-//! Advice in the report.
+//! Speed advice in the report.
 
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ pub struct AdviceReport {
     /// Speed below which heads at different places along the hull run out of phase, m/s; zero if a lower
     /// speed always helps.
     pub from_mps: f64,
-    /// Speed nearest to the present one that meets the target, m/s; `None` if the present speed meets it.
+    /// Speed nearest to the present speed that meets the target, m/s; `None` if the present speed meets it.
     pub nearest_mps: Option<f64>,
     /// Factor that limits the speed.
     pub reason: &'static str,

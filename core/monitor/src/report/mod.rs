@@ -32,13 +32,13 @@ pub use spread::SpreadReport;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 pub use unsure::NoVerdictReport;
 
-/// Version of the report schema.
+/// Version of the report's JSON schema.
 pub const REPORT_VERSION: u32 = 9;
 
 /// A whole report. The field names are a contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// Version of this schema.
+    /// Version of the report's JSON schema.
     pub report_version: u32,
     /// Reason for which the dive is no inspection; `None` if the dive is an inspection.
     pub not_inspected: Option<NotInspectedReport>,
@@ -46,7 +46,7 @@ pub struct Report {
     pub log: Option<LogReport>,
     /// Digest of all results, 16 hexadecimal digits.
     pub digest: String,
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
@@ -54,7 +54,7 @@ pub struct Report {
     pub confidence_sd: u32,
     /// Coverage extent: the part of the tunnel that the metres by verdict cover.
     pub coverage_extent: CoverageExtentReport,
-    /// The dive as a whole.
+    /// Summary figures of the dive as a whole.
     pub dive: DiveReport,
     /// Metres by verdict, and spacings over all sections.
     pub summary: SummaryReport,
@@ -79,13 +79,13 @@ pub struct Report {
     pub alert_list: Vec<ListedAlertJson>,
     /// Number of cleared alerts left out for lack of room.
     pub alerts_dropped: u64,
-    /// Notes made during the dive.
+    /// Notes that the crew made during the dive.
     pub notes: Vec<NoteJson>,
     /// Number of notes left out for lack of room.
     pub notes_dropped: u32,
     /// Traffic statistics of the operator's input; `None` without any input.
     pub console: Option<ConsoleReport>,
-    /// Advice history.
+    /// Speed advice history.
     pub advice: Vec<AdviceReport>,
     /// Number of advice entries dropped for lack of room.
     pub advice_dropped: u64,
@@ -98,11 +98,11 @@ pub struct Report {
 /// The log that a dive was read from or written to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LogReport {
-    /// Path as given.
+    /// Path of the log, as given by the user.
     pub path: String,
     /// SHA-256, hexadecimal. For a recording in parts, it is that of the concatenated parts.
     pub sha256: String,
-    /// Number of messages from sources.
+    /// Number of messages from sources in the log.
     pub messages: u64,
     /// Losses of logged data, in plain text. Each text has the time span of the loss.
     pub losses: Vec<String>,
@@ -112,7 +112,7 @@ pub struct LogReport {
     pub parts: Vec<PartReport>,
 }
 
-/// A part of a recording.
+/// A file of a recording in parts.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct PartReport {
     /// Path of the file.
@@ -123,7 +123,7 @@ pub struct PartReport {
     pub messages: u64,
 }
 
-/// The dive as a whole.
+/// Summary figures of the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiveReport {
     /// Time from the first to the last packet, seconds.

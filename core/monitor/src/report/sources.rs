@@ -1,4 +1,4 @@
-//! Sources in the report.
+//! Statistics of the sources in the report.
 
 use headrace_geometry::time::MonoNs;
 use serde::Serialize;
@@ -11,7 +11,7 @@ use headrace_sensor::device_clock::ClockReport;
 pub struct SourceReport {
     /// Name of the source.
     pub id: String,
-    /// Kind of device.
+    /// Kind of device that the source is.
     pub plugin: String,
     /// Number of packets from the source.
     pub packets: u64,

@@ -43,7 +43,7 @@ const SLOW_MPS: f64 = 0.01;
 pub(super) struct Plan {
     /// Speed for which the heads are set in phase, m/s; zero if none is planned.
     pub(super) planned_mps: f64,
-    /// Target T, m.
+    /// Coverage target T, m.
     pub(super) target_m: f64,
     /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
     pub(super) confidence_sd: f64,

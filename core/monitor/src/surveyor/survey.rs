@@ -14,7 +14,7 @@ use headrace_coverage::Request;
 /// Maximum number of runs of flagged sections that change when one section is judged: its own run and two
 /// neighbours.
 const RUNS_EACH: usize = 3;
-/// Notices per judged section: one for the section, and one per run.
+/// Notices per judged section: one for the section, and one for each changed run.
 const NOTICES_EACH: usize = 1 + RUNS_EACH;
 
 /// Position of the surveyor in the tick's list of placed pings and updates.

@@ -324,8 +324,8 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
     }
 
-    /// The first two returns are from a rock. Pings that come while the first one waits take effect when it
-    /// is classified.
+    /// The first two returns are from a rock. Pings that arrive while the first return waits take effect when
+    /// it is classified.
     #[test]
     fn lost_ping_after_an_undecided_return_interrupts_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {

@@ -15,7 +15,7 @@ use headrace_fusion::NoFix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::advice::Reason;
 
-/// First lines of the file.
+/// First lines of the generated TypeScript file.
 const HEADER: &str =
     "// Words for the codes of the feed. Generated from core/monitor/src/words.rs; renew it with
 // HEADRACE_RENEW_WORDS=1 cargo test -p headrace_tests --test page words
