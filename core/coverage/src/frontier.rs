@@ -144,9 +144,9 @@ pub struct Outlook {
     pub none_alive: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Stretch behind the place where the vehicle began or turned back.
+    /// Stretch behind the place where the vehicle began or turned back, where not all heads have been.
     ///
-    /// Not all heads have been in this stretch. On the present course, the other heads will not reach it.
+    /// On the present course, the remaining heads will not reach it.
     pub not_passed: Option<Reach>,
     /// Stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub through: Option<Reach>,

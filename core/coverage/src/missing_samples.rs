@@ -41,7 +41,7 @@ pub struct MissingSamples {
 stateful!(MissingSamples { state: next; lists: ring, extents_m; });
 
 impl Default for MissingSamples {
-    /// Allocates: at startup, all that it will ever use.
+    /// Creates an empty list. Allocates: at startup, all that the list will ever use.
     fn default() -> Self {
         Self { ring: Vec::with_capacity(ROOM), extents_m: Vec::with_capacity(ROOM / BLOCK), next: 0 }
     }

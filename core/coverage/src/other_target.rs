@@ -118,7 +118,7 @@ mod tests {
         }
     }
 
-    /// The error of the hole is two standard deviations of 0.05 m.
+    /// The position error allowed for is two standard deviations of 0.05 m each.
     #[test]
     fn verdict_for_another_target_respects_position_error_and_doubtful_samples() {
         let mut seen = Seen::new();

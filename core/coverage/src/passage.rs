@@ -50,11 +50,11 @@ pub struct Drive {
     pub planned_mps: f64,
     /// Longest time between two passes of the heads that turned, seconds.
     pub gap_s: f64,
-    /// Time `gap_s` if these heads were evenly spread, seconds.
+    /// Time `gap_s` if the heads that turned were evenly spread, seconds.
     pub even_gap_s: f64,
     /// Time `gap_s` if all heads were turning, with none silent or stalled, seconds.
     pub healthy_gap_s: f64,
-    /// Time `gap_s` if all heads' angles were as scheduled, at this speed, seconds.
+    /// Time `gap_s` if all heads' angles were as scheduled, at the present speed, seconds.
     pub planned_gap_s: f64,
     /// Time `gap_s` if all configured heads were turning and evenly spread, seconds.
     pub all_gap_s: f64,
@@ -70,9 +70,9 @@ pub struct Drive {
     pub ping_period_s: f64,
     /// Largest distance that the beams have swung along the tunnel since the neighbouring passes, m.
     pub swing_m: f64,
-    /// Largest step along the perimeter between two pings from the vehicle's position, by geometry, m.
+    /// Largest step along the perimeter between two pings, computed from the vehicle's position, m.
     pub t_y_m: f64,
-    /// Largest step along the perimeter between two pings from the tunnel's centre, m.
+    /// Largest step along the perimeter between two pings, computed from the tunnel's centre, m.
     pub middle_t_y_m: f64,
     /// Largest speed that meets the target from the tunnel's centre, m/s.
     ///

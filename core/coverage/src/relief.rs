@@ -159,7 +159,8 @@ impl Relief {
             return;
         };
         if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
-            // This head agrees with the design here, so an object that was seen only once is gone.
+            // This head agrees with the design here, so the unconfirmed object that earlier returns showed
+            // here is gone.
             cell.off = None;
         }
         let seen = if as_designed { &mut cell.as_designed } else { &mut cell.contradicting };

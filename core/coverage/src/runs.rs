@@ -153,7 +153,7 @@ pub struct Runs {
 
 stateful!(Runs { lists: runs; slots: member, failing; fixed: first, join; });
 
-/// Context for updating runs, with the callback for changed ones.
+/// Context for updating runs, with the callback for changed runs.
 pub struct Telling<'a> {
     /// Time of the change.
     pub at: MonoNs,

@@ -143,7 +143,7 @@ pub struct Section {
     pub passage: Passage,
     /// T_x of the section's samples: distance between passes, m.
     pub t_x_m: Spread,
-    /// T_y of the section's samples: distance between neighbours of one sweep, m.
+    /// T_y of the section's samples: distance between neighbouring samples of one sweep, m.
     pub t_y_m: Spread,
     /// T of the section's samples: lattice diagonal of T_x and T_y, m.
     pub t_m: Spread,

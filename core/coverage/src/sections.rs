@@ -301,7 +301,7 @@ impl Sections {
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         if request.ended.is_some() && section.verdict == Verdict::Open && section.is_flagged() {
-            // The section was missed, and the dive ended on the way back over it.
+            // The section failed, and the dive ended while the vehicle went back over it.
             (section.verdict, section.not_inspected) = (Verdict::Fail, false);
         }
         // The evidence of an unchanged hole is kept, because its missing samples may no longer be stored.

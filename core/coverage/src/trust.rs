@@ -14,7 +14,8 @@ pub enum Distrust {
     Scattered(f64),
     /// The head's range is constant although the range to the design varies; the value is the head's range.
     Constant(f64),
-    /// The head contradicts the design where other heads agree with it; the value is the mean deviation.
+    /// The head contradicts the design where other heads agree with it; the value is the mean deviation from
+    /// the design.
     Outvoted(f64),
 }
 
@@ -181,7 +182,7 @@ impl HeadTrust {
         limits: &WallLimits,
         others: &Others,
     ) -> Option<(Distrust, [f64; 2])> {
-        // A stalled head sees only one place, which may well be off the design.
+        // A stalled head sees only one place, and the wall there may well deviate from the design.
         if beam.standing {
             return None;
         }

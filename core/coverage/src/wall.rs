@@ -99,7 +99,7 @@ impl Run {
         usize::from(self.waits) == MOST_WAITING
     }
 
-    /// Removes the waiting returns except the last one.
+    /// Removes all waiting returns except the last one.
     fn give_up(&mut self, last: &PlacedReturn) {
         self.waiting[0] = *last;
         self.waits = 1;

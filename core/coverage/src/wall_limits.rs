@@ -1,4 +1,5 @@
-//! Limits within which returns count as wall: on their deviation from the design, and from one another.
+//! Limits for accepting returns as wall: on their deviation from the design profile, and on their deviation
+//! from one another.
 
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +47,7 @@ impl WallLimits {
         placed.off_m.abs() <= self.tolerance_m
     }
 
-    /// Whether two returns of neighbouring beams belong to one wall.
+    /// Whether two returns of neighbouring beams belong to the same wall.
     pub(super) fn agree(&self, a: &PlacedReturn, b: &PlacedReturn) -> bool {
         let apart_m = self.apart_m(a, b);
         let slope_m = (SLOPE * apart_m).min(MOST_SLOPE * self.tolerance_m);

@@ -122,7 +122,8 @@ impl Adviser {
         self.report(into);
     }
 
-    /// Advice before the next tick, with room for a tick of any size. Allocates: all memory of the list.
+    /// Creates the advice result that readers see before the first tick, with room for a tick of any size.
+    /// Allocates: all memory of the list.
     pub(super) fn advised_with_room(&self) -> Advised {
         let mut advised = Advised { entries: Vec::with_capacity(MAX_TICK_PACKETS), ..Advised::default() };
         advised.stream.reserve_as(&self.part.world.resource::<AdviceStream>().0);
@@ -176,7 +177,7 @@ fn advise(
 }
 
 impl Advisor {
-    /// Allocates: at startup, all memory of the advisor.
+    /// Creates the state of the advisor. Allocates: at startup, all memory of the advisor.
     pub(super) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }

@@ -114,7 +114,7 @@ pub(crate) struct ActiveObservation {
     pub(crate) occurrences: Occurrences,
 }
 
-/// All observations that hold now.
+/// List of all observations that hold now.
 pub(crate) type ActiveObservations = [Option<ActiveObservation>; MOST_OBSERVATIONS];
 
 /// Slowest practical speed, m/s. A lower advised speed counts as no speed.
@@ -128,13 +128,13 @@ pub enum SensorState {
     Never,
     /// No reading has arrived for longer than [`OLD_AFTER`].
     Silent,
-    /// A head whose readings all come from one angle.
+    /// The sensor is a head whose readings all come from one angle.
     Stalled,
-    /// A head that turns and pings without detecting the wall.
+    /// The sensor is a head that turns and pings without detecting the wall.
     Deaf,
     /// The sensor repeats its last reading.
     Hung,
-    /// A head that is distrusted.
+    /// The sensor is a head that is distrusted.
     Distrusted,
     /// The sensor's readings arrive.
     Ok,
@@ -301,7 +301,7 @@ impl LiveState {
         (0..usize::from(self.sources)).filter(is_silent)
     }
 
-    /// Sensors in a state, in the order of sources.
+    /// Sensors that are in the given state, in the order of sources.
     pub fn sensors_that_are(&self, state: SensorState) -> impl Iterator<Item = usize> + '_ {
         (0..usize::from(self.sources)).filter(move |source| self.sensor(*source) == state)
     }

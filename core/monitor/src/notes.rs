@@ -46,7 +46,7 @@ pub struct Notes {
 stateful!(Notes { state: taken; lists: notes; });
 
 impl Default for Notes {
-    /// Allocates: at startup, all memory of the list.
+    /// Creates an empty list of notes. Allocates: at startup, all memory of the list.
     fn default() -> Self {
         Self { notes: Vec::with_capacity(MOST_NOTES), taken: 0 }
     }

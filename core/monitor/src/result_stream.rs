@@ -226,7 +226,7 @@ impl RecordKind {
                 ("kind", Integer),
                 ("x_m", Number),
                 ("off_m", Number),
-                // Present only if the observation names a source.
+                // The word `source` is present only if the observation names a source.
                 ("source", Integer),
             ],
             Self::AlertChange => &ALERT_CHANGE,
@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn records_are_read_as_written() {
+    fn result_records_are_read_as_written() {
         let stream = filled();
         let (first, rest) = first_record(stream.words()).unwrap();
         assert_eq!(first, Record { kind: Some(RecordKind::Run), words: &[7, 1] });
@@ -408,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn short_text_is_kept_and_long_one_is_cut() {
+    fn short_text_is_kept_and_long_text_is_cut_in_records() {
         for (text, back) in [("", ""), ("0.3 deg", "0.3 deg"), ("a mode's long name", "a mode's long na")] {
             let mut stream = ResultStream::default();
             stream.keep();

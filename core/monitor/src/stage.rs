@@ -6,7 +6,7 @@ use bevy_ecs::schedule::SystemSet;
 ///
 /// A stage doesn't run in a tick without input for it.
 pub trait Stage: SystemSet + Copy + PartialEq {
-    /// All stages of the world, in order.
+    /// All stages of the world, in the order in which they run.
     const ALL: &'static [Self];
 }
 

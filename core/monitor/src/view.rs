@@ -121,7 +121,7 @@ impl<'a> DiveView<'a> {
         self.surveyor.tally()
     }
 
-    /// Alerts with their life cycle.
+    /// Alerts of the dive with their life cycle.
     pub fn alert_list(&self) -> &'a AlertList {
         &self.alerter.list
     }

@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn error_names_the_violated_limit() {
+    fn voice_recording_error_names_the_violated_limit() {
         assert!(voice(b"OggS and so on").checked().is_ok());
         assert_eq!(Voice { id: 0, ..voice(b"OggS") }.checked(), Err(VoiceError::Id));
         assert_eq!(Voice { seconds: 61, ..voice(b"OggS") }.checked(), Err(VoiceError::Seconds(61)));

@@ -16,7 +16,7 @@ use headrace_sensor::device::{CounterSpec, InertialNoise};
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// Allowed values of noise settings.
 ///
-/// Zero is excluded, because the filter would then trust the sensor concerned alone.
+/// Zero is excluded, because the filter would then rely on that sensor alone.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn epoch_and_window_come_from_the_file() {
+    fn filter_epoch_and_window_come_from_the_vehicle_file() {
         assert_eq!(parsed("[navigation]\n").unwrap(), Settings::default());
         assert_eq!(
             parsed("[navigation]\nepoch_s = 0.1\nwindow_s = 0.2\n").unwrap(),

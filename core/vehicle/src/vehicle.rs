@@ -262,7 +262,7 @@ fn parse_tunnel(root: &Section<'_>, load: Loader<'_>) -> Result<(Option<TunnelCo
     Ok((root.part(|| TunnelConfig::from_section(&section, load))?, axis_yaw_rad))
 }
 
-/// Checks that the loop can allocate its memory for sections and samples.
+/// Checks that sections and wall cells are not too small for the memory that the loop allocates.
 fn check_fineness(
     root: &Section<'_>,
     tunnel: &TunnelConfig,

@@ -184,7 +184,7 @@ fn two_causes_are_named_if_removing_two_of_three_factors_suffices() {
 ///
 /// If this distance exceeds the target, the setting alone does not explain the fail.
 #[test]
-fn setting_is_a_cause_only_if_its_longer_turn_meets_the_target() {
+fn head_setting_is_a_cause_only_if_its_longer_turn_meets_the_target() {
     let other = |turn: f64| OtherSettings { finer_step: 0.5, finer_turn: turn, longer_turn: turn };
     let drive = |turn: f64| Drive { other: other(turn), ..sound() };
     let far = |turn: f64| Wall {

@@ -306,8 +306,8 @@ impl<'a> Trial<'a> {
         let [now, then] = self.drives(removed);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
-        // The driving figures are those of a single moment, so their effect is limited to the size of the
-        // hole.
+        // The driving figures are those of a single moment, so the size of the hole limits the effect
+        // computed from them.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         WallChanges {

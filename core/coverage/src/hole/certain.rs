@@ -97,7 +97,7 @@ mod tests {
                 });
                 nearest.fold(f64::INFINITY, f64::min).min(reach_m - x_m)
             };
-            // The radius grows with arc length up to the opposite side, and then decreases.
+            // The required radius grows with arc length up to the opposite side, and then decreases.
             let radius_m = |arc_m: f64| radius_m + slope * arc_m.min(PERIMETER_M - arc_m);
             let places = (0..=25).flat_map(|i| (0..600).map(move |k| {
                 (1.0 + 0.01 * f64::from(i), 0.01 * f64::from(k))

@@ -24,7 +24,7 @@ pub(super) struct Share {
 }
 
 impl Share {
-    /// Returns the share of a tile's only sample: the whole tile, with these half edges.
+    /// Returns the share of a tile's only sample: the whole tile, whose half edges are given.
     fn whole(owner: (f64, f64), (half_x, half_arc): (f64, f64)) -> Self {
         let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
         let (low, high) = (-owner.1 - half_arc, -owner.1 + half_arc);

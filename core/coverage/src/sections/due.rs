@@ -366,7 +366,7 @@ mod tests {
     ///
     /// The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn limit_of_an_empty_circle_includes_the_position_error_at_its_place() {
+    fn size_limit_of_an_empty_circle_includes_the_position_error_at_its_place() {
         for is_beside in [true, false] {
             let fails = |circle_m: f64, errors: [f64; 2]| fails(circle_m, is_beside, errors, 10.9);
             assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "the circle must exceed the target");
@@ -380,7 +380,7 @@ mod tests {
         for (to_come_m, yaw_rad) in
             [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
         {
-            // At other places on the wall, the circle would need to be far larger.
+            // At other places on the wall than above the vehicle, the circle would need to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
         assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in the circle");

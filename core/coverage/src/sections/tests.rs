@@ -12,7 +12,7 @@ fn sections() -> Sections {
 }
 
 #[test]
-fn sections_of_a_stretch_are_all_existing_ones_that_it_touches() {
+fn stretch_contains_all_existing_sections_that_it_touches() {
     let of = |from_m: f64, to_m: f64| sections().sections_of(Some(Reach { from_m, to_m }));
     assert_eq!(of(1.1, 1.9), 4..8);
     assert_eq!(of(1.0, 2.0), 4..9, "both ends at section boundaries");

@@ -264,7 +264,7 @@ fn memory_stops_growing_while_the_vehicle_is_stationary() {
 fn step_is_dropped_only_near_a_step_in_the_same_direction() {
     let mut store = SampleStore::new(LAYOUT);
     let mut goes = |around_m: f64, k: u32| {
-        // The samples are spread over a decimetre of one cell, a millimetre apart.
+        // The test samples are spread over a decimetre of one cell, a millimetre apart.
         let off_m = 0.001 * f64::from(k % 100);
         let before = store.usage().thinned;
         store.insert(WallSample { step_m: Some([0.002, around_m]), ..sample(100.1, 3.05 + off_m) }).unwrap();
@@ -363,7 +363,7 @@ fn packed_samples_of_a_sweep_take_one_word_each() {
 }
 
 #[test]
-fn cell_edge_is_half_the_target_within_limits() {
+fn sample_store_cell_edge_is_half_the_target_within_limits() {
     for (target_m, cell_m) in [(0.5, 0.25), (0.8, 0.4), (1.0, 0.5), (6.0, 0.5), (0.1, 0.05), (0.02, 0.05)] {
         assert!((StoreLayout::cell_for_target_m(target_m) - cell_m).abs() < 1e-12, "{target_m}");
     }

@@ -89,7 +89,8 @@ fn smooth_rough_and_wide_walls_are_accepted_in_tunnels_of_any_size() {
     for radius_m in [0.3, 1.0, 6.0] {
         Turning::new(radius_m, 1).all_wall(10, |_, _| radius_m);
         Turning::new(radius_m, 1).all_wall(10, |_, _| 1.06 * radius_m);
-        // The wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one along it.
+        // The test wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one
+        // lobe along it.
         Turning::new(radius_m, 2)
             .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
         // The vehicle measures such ranges if it is beside the centre while its estimated position is in the

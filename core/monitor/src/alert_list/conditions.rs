@@ -25,8 +25,8 @@ const GROWS: DurNs = DurNs(10_000_000_000);
 const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
 const TIME_PCT: [f64; 3] = [10.0, 0.0, -1.0];
 const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
-/// Dead band: the remaining amount must rise by this much above the limit of the warning, percent, before the
-/// alert ends.
+/// Dead band: before the alert ends, the remaining amount must rise by this much above the limit of the
+/// warning, percent.
 const MORE_PCT: f64 = 2.0;
 
 /// Record of which kinds of data and positions have arrived so far.
@@ -136,7 +136,7 @@ impl AlertList {
             PositionState::None(lacking) => (true, Figures::MissingRequirement(lacking)),
             _ => (false, Figures::None),
         };
-        // Inertial navigation needs time to align before it gives the first position.
+        // Navigation needs time to align before it gives the first position.
         let is_late = at.since(begun).0 >= GRACE.0;
         let lacks = lacks && (self.had.position || is_late);
         self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
@@ -283,12 +283,12 @@ impl AlertList {
         }
     }
 
-    /// Length of cable left beyond the vehicle's place, m; `None` if the length of the cable is unknown.
+    /// Length of cable left beyond the vehicle's chainage, m; `None` if the length of the cable is unknown.
     pub(super) fn cable_left_m(&self, x_m: Option<f64>) -> Option<f64> {
         self.limits.cable_m.zip(x_m).map(|(cable_m, x_m)| cable_m - x_m.max(0.0))
     }
 
-    /// Time left, seconds; `None` if the dive's duration is unlimited.
+    /// Remaining dive time, seconds; `None` if the dive's duration is unlimited.
     pub(super) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
         let all = self.limits.dive_time?;
         Some((all - self.begun.map_or(DurNs(0), |begun| at.since(begun))).as_secs_f64())
@@ -298,7 +298,7 @@ impl AlertList {
         self.timers.get(timer::place(kind, source)).is_some_and(|timer| timer.number != 0)
     }
 
-    /// Applies an observed condition to its situation, and raises or ends its alert when due.
+    /// Updates the timer of a condition's situation, and raises or ends the alert when that is due.
     pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);

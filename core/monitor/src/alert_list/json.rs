@@ -14,9 +14,9 @@ use crate::source::SourceInfo;
 use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};
 use headrace_geometry::time::MonoNs;
 
-/// Maximum number of alerts in a list.
+/// Maximum number of alerts in the JSON list.
 pub const MOST_SHOWN: usize = 64;
-/// Cleared alerts are added while the list is shorter than this.
+/// Cleared alerts are added to the JSON list up to this length.
 const RECENT: usize = 20;
 
 /// An alert in JSON.
@@ -56,7 +56,7 @@ pub struct ListedAlertJson {
     pub to_m: Option<f64>,
     /// Place to go back to in order to pass the missed stretch again, m.
     pub back_to_m: Option<f64>,
-    /// Largest speed for passing the stretch again, m/s.
+    /// Largest speed for passing the alert's stretch again, m/s.
     pub at_most_mps: Option<f64>,
     /// Id of the sensor that the alert names.
     pub sensor: Option<String>,
@@ -124,9 +124,9 @@ pub struct AlertCountsJson {
 /// Remaining cable, time and charge. An unknown amount is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct LeftJson {
-    /// Length of cable left beyond the vehicle's place, m.
+    /// Length of cable left beyond the vehicle's chainage, m.
     pub cable_m: Option<f64>,
-    /// Time left, seconds; negative after the end of the planned dive time.
+    /// Remaining dive time, seconds; negative after the end of the planned dive time.
     pub time_s: Option<f64>,
     /// Charge of the battery, percent.
     pub battery_pct: Option<f64>,

@@ -165,7 +165,7 @@ impl AlertList {
         kept.stretch = both.map(|(one, other)| (one.0.min(other.0), one.1.max(other.1))).or(kept.stretch);
         kept.count += before.count;
         kept.open_runs += before.open_runs;
-        // An unacknowledged alert must not disappear behind an acknowledged one.
+        // If either alert still needs acknowledgement, the merged alert needs it, too.
         if before.needs_acknowledgement() {
             (kept.acknowledged, kept.silenced_until) = (None, before.silenced_until);
         }

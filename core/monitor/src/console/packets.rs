@@ -45,7 +45,7 @@ pub(crate) struct ReceivedCommand {
 pub(crate) struct Commands(pub(crate) Vec<ReceivedCommand>);
 
 impl Default for Commands {
-    /// Allocates: at startup, all memory of the list.
+    /// Creates an empty list of commands. Allocates: at startup, all memory of the list.
     fn default() -> Self {
         Self(Vec::with_capacity(MOST_OF_TICK))
     }

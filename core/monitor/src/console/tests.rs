@@ -7,7 +7,7 @@ fn who(text: &str) -> Who {
 }
 
 #[test]
-fn commands_are_read_as_documented() {
+fn console_commands_are_parsed_as_documented() {
     let note = |text: &str| Command::Note { text: NoteText::new(text).unwrap(), by: who("AB") };
     for (json, command) in [
         (r#"{"do":"acknowledge","alert":12,"by":"AB"}"#, Command::Acknowledge { alert: 12, by: who("AB") }),
@@ -131,7 +131,7 @@ proptest! {
     }
 
     #[test]
-    fn any_packet_is_parsed_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+    fn random_console_packets_are_parsed_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
         if Command::parse(&bytes).is_ok() {
             prop_assert!(serde_json::from_slice::<serde_json::Value>(&bytes).is_ok());
         }

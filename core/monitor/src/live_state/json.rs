@@ -23,13 +23,13 @@ pub struct LiveStateJson {
     pub age_s: Option<f64>,
     /// Whether the state is to be shown as stale.
     pub old: bool,
-    /// Present condition, as a word.
+    /// Present condition of the dive, as a word.
     pub condition: &'static str,
     /// Colour of the condition.
     pub lamp: Lamp,
     /// Position of the vehicle, with its state.
     pub position: PositionJson,
-    /// Speed along the tunnel, positive inwards, m/s; `None` without a position.
+    /// Speed of the vehicle along the tunnel, positive inwards, m/s; `None` without a position.
     pub speed_mps: Option<f64>,
     /// Largest speed that meets the target, m/s; `None` if there is none.
     pub v_max_mps: Option<f64>,
@@ -70,7 +70,7 @@ pub struct PositionJson {
     pub why: Option<&'static str>,
     /// Chainage of the vehicle, m.
     pub chainage_m: Option<f64>,
-    /// Chainage of the vehicle as stationing.
+    /// Chainage of the vehicle as stationing, such as 1+240.50.
     pub station: Option<String>,
     /// Standard deviation of the chainage, m.
     pub chainage_sd_m: Option<f64>,
@@ -132,7 +132,7 @@ pub struct SensorJson {
     pub is_head: bool,
 }
 
-/// Metres of the coverage extent.
+/// Metres of the coverage extent by verdict, and their sum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MetresJson {
     /// Metres by verdict.
@@ -142,7 +142,7 @@ pub struct MetresJson {
     pub way_m: f64,
 }
 
-/// A stretch without a verdict.
+/// A stretch of tunnel without a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StretchJson {
     /// Reason for the missing verdict: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`,

@@ -163,7 +163,7 @@ fn observation_has_a_line_when_its_alert_is_raised() {
 }
 
 #[test]
-fn line_breaks_between_words_and_before_the_action() {
+fn pilot_line_breaks_between_words_and_before_the_action() {
     let line = PilotLine {
         place: "0+014.25".to_owned(),
         speed: String::new(),

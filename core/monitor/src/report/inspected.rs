@@ -25,7 +25,7 @@ pub struct CoverageExtentReport {
 /// Reason for which a dive is no inspection.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotInspectedReport {
-    /// One of `no_sonar`, `no_position`, `outside_tunnel` and `mostly_no_position`.
+    /// Reason: `no_sonar`, `no_position`, `outside_tunnel` or `mostly_no_position`.
     pub reason: &'static str,
     /// Requirement that was missing most often for returns without a position.
     ///

@@ -45,7 +45,7 @@ pub(crate) enum Class {
 pub(crate) struct Classified(pub(crate) Vec<Class>);
 
 impl Classified {
-    /// Allocates: all memory of the list.
+    /// Creates an empty list of classifications. Allocates: all memory of the list.
     pub(crate) fn with_room() -> Self {
         Self(Vec::with_capacity(2 * MAX_TICK_READINGS))
     }

@@ -110,7 +110,7 @@ pub(crate) struct MissingSampleFinder {
 stateful!(MissingSampleFinder { state: heads, pose, forgot, stalled, deaf; lists: away; });
 
 impl Default for MissingSampleFinder {
-    /// Allocates: at startup, all memory of the finder.
+    /// Creates a finder of missing samples. Allocates: at startup, all memory of the finder.
     fn default() -> Self {
         Self {
             heads: [Turning::default(); MAX_HEADS],

@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_counted_if_the_store_has_no_room() {
+    fn samples_are_counted_even_if_the_store_is_full() {
         let mut bench = Bench::new();
         let perimeter_m = bench.tunnel.profile.perimeter_m();
         let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 32.0, cell_m: 0.25, capacity: 2 };

@@ -53,7 +53,7 @@ fn lamp_colour_follows_the_ratio_of_speed_to_v_max() {
     );
 }
 
-/// Over wall with the verdict pass any speed is fine, unless the position is doubtful or there is no sonar.
+/// Over wall that has passed, any speed is fine, unless the position is doubtful or sonar data are missing.
 #[test]
 fn any_speed_is_fine_over_wall_with_the_verdict_pass() {
     let back = LiveState { passed: true, speed_mps: Some(-0.3), ..state() };
@@ -127,7 +127,7 @@ fn missing_data_takes_precedence_over_doubtful_data() {
 }
 
 #[test]
-fn state_becomes_stale_as_ticks_continue_without_data() {
+fn live_state_becomes_stale_as_ticks_continue_without_data() {
     let after = |ms: u64| LiveState { now: MonoNs(at(10).0 + ms * 1_000_000), ..state() };
     assert_eq!([after(2000), after(2001)].map(|state| state.is_old()), [false, true]);
     assert_eq!(
@@ -158,7 +158,7 @@ fn condition_is_outside_the_tunnel_only_if_no_head_can_be_inside() {
     assert_eq!([before, beyond], [Condition::Outside(0.0), Condition::Outside(100.0)]);
     assert_eq!(inside, [Condition::Good; 3]);
     assert_eq!((beyond.as_str(), beyond.lamp()), ("outside", Lamp::Amber));
-    // A doubtful position takes precedence.
+    // A doubtful position takes precedence over being outside the tunnel.
     let unsure = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..at(100.6) };
     assert_eq!(unsure.condition(), Condition::CannotSay(PositionDoubt::Cable));
 }

@@ -254,7 +254,7 @@ fn missing_samples_of_a_silent_head_are_at_its_extrapolated_angles() {
 /// For pings without a fix, the missing position is an additional cause. The pings are placed along the track
 /// as soon as there is a fix again.
 #[test]
-fn simulated_pings_without_a_fix_are_placed_later() {
+fn simulated_pings_without_a_fix_are_placed_at_the_next_fix() {
     let mut dive = Dive::new();
     dive.beat(10.0, true);
     assert_eq!((dive.beat(11.0, false).len(), dive.lacking.away.len()), (0, 50));
