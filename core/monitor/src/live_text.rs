@@ -42,7 +42,8 @@ impl PilotLine {
         text
     }
 
-    /// The pilot's line, broken into lines of at most `columns` characters.
+    /// The pilot's line, broken into lines of at most `columns` characters. Continuation lines are indented
+    /// to the beginning of the first line's text.
     pub fn broken(&self, columns: usize) -> Vec<String> {
         let whole = self.text();
         if whole.chars().count() <= columns {

@@ -63,7 +63,8 @@ impl From<&Evidence> for CauseFigures {
 }
 
 impl CauseFigures {
-    /// Figures of a run of failed sections.
+    /// Figures of a run of failed sections. For each cause that the text names, the figures come from the
+    /// section that represents the cause.
     pub fn of_run(sections: &Sections, run: &Run) -> Option<Self> {
         let causes = run.named();
         let main = Self::from(&sections.evidence_of(run, run.cause)?);

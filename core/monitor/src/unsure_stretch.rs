@@ -1,4 +1,5 @@
-//! An unsure stretch (neighbouring sections that neither pass nor fail) and its texts.
+//! An unsure stretch (neighbouring sections that neither pass nor fail) and its texts. Allocates: outlets
+//! only, never within a tick.
 
 use serde::Serialize;
 

@@ -155,7 +155,8 @@ pub struct StretchJson {
 }
 
 impl LiveState {
-    /// The live state as JSON, with the alerts of the same dive.
+    /// The live state as JSON, with the alerts of the same dive. See
+    /// [`DiveView::live_state_json`](crate::view::DiveView::live_state_json).
     pub fn json(&self, around: &TextContext<'_>, alerts: &AlertList) -> LiveStateJson {
         let TextContext { sources, section_m, .. } = *around;
         let (shown, alerts_hidden) = alerts.shown();
