@@ -23,9 +23,9 @@ pub struct AtomicFile {
 /// How an incomplete file is stored beside its destination.
 #[derive(Debug)]
 enum Beside {
-    /// Under a temporary name.
+    /// The incomplete file has a temporary name.
     Named(PathBuf),
-    /// Without a name, so that nothing is left behind even if the program is killed.
+    /// The incomplete file has no name, so that nothing is left behind even if the program is killed.
     Nameless,
 }
 

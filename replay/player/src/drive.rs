@@ -13,11 +13,11 @@ use crate::log::LogError;
 /// Description of a feed's next packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coming {
-    /// Time of receipt.
+    /// Time at which the packet was received.
     pub at: MonoNs,
-    /// Source number in the loop.
+    /// Number of the packet's source in the loop.
     pub source: SourceId,
-    /// Length, bytes.
+    /// Length of the packet, bytes.
     pub len: usize,
 }
 
@@ -74,13 +74,13 @@ pub enum DriveError {
          loop 0, or systems of its own that place pings"
     )]
     Unlike {
-        /// Number of the loop that differs, counted from 0.
+        /// Index of the loop that differs from loop 0.
         number: usize,
     },
     /// A thread of the replay has panicked, which is a bug. The loop must not be used afterwards.
     #[error("driving the loop: the thread that {what} has panicked: {message}; please report it")]
     Panicked {
-        /// Task of the thread.
+        /// Task of the thread that panicked.
         what: &'static str,
         /// Panic message.
         message: String,
@@ -196,7 +196,7 @@ impl Driver {
         sent
     }
 
-    /// Continues at `until`, after both the feed and the loop have jumped there.
+    /// Sets the end of the last tick to `until`, after both the feed and the loop have jumped there.
     pub fn jump_to(&mut self, until: MonoNs) {
         self.until = Some(until);
     }

@@ -20,8 +20,8 @@ use crate::adviser::{SimulationError, simulation};
 use crate::drive::{DriveError, Pace, drive};
 use crate::simulation_feed::SimulationFeed;
 
-/// Maximum change of D, m, that counts as negligible. The whole confidence interval of the change must be within this
-/// limit.
+/// Maximum change of the hole diameter D, m, that counts as negligible. The whole confidence interval of the change
+/// must be within this limit.
 pub const HOLE_LIMIT_M: f64 = 0.01;
 /// Maximum change of the passed length that counts as negligible, as a share of the coverage extent.
 pub const PASSED_LIMIT: f64 = 0.01;
@@ -50,7 +50,7 @@ pub struct LeftOut {
     pub effects: Vec<&'static str>,
     /// Cost of these effects, ns of processor time per sonar return.
     pub price_ns: Mean,
-    /// Mean change of D over the sections if the effects are left out, m.
+    /// Mean change of the hole diameter D over the sections if the effects are left out, m.
     pub hole_m: Mean,
     /// Change of the passed length if the effects are left out, as a share of the coverage extent.
     pub passed: Mean,
@@ -59,13 +59,13 @@ pub struct LeftOut {
 /// Cost and influence of a scene's effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectInfluence {
-    /// Number of seeds.
+    /// Number of seeds with which the dives were simulated.
     pub seeds: usize,
-    /// Length of tunnel that was judged, m.
+    /// Length of the tunnel sections that the vehicle has passed, m.
     pub way_m: f64,
     /// Passed length with all effects, as a share of the coverage extent.
     pub passed: Mean,
-    /// Mean of D over the sections with all effects, m.
+    /// Mean of the hole diameter D over the sections with all effects, m.
     pub hole_m: Mean,
     /// Cost of simulating with all effects, ns of processor time per sonar return.
     pub all_ns: Mean,
@@ -133,7 +133,7 @@ fn first(scenes: &mut [Scene]) -> Result<&mut Scene, EffectInfluenceError> {
 /// Simulates the same dives with and without effects.
 struct Paired<'a> {
     scenes: &'a mut [Scene],
-    /// Results with all effects, seed by seed.
+    /// Results of the dives with all effects, one dive per seed.
     with: Vec<Figures>,
     dived: usize,
     most: usize,
@@ -222,12 +222,13 @@ impl Figures {
         Ok(figures)
     }
 
-    /// Returns the mean of D over all sections, m.
+    /// Returns the mean of the hole diameter D over all sections, m.
     fn hole_m(&self) -> f64 {
         self.holes_m.values().sum::<f64>() / self.holes_m.len() as f64
     }
 
-    /// Returns the mean difference of D over the sections that both dives have, m; zero if there are none.
+    /// Returns the mean difference of the hole diameter D over the sections that both dives have, m; zero if there
+    /// are none.
     fn hole_more_than_m(&self, other: &Self) -> f64 {
         let both = self.holes_m.iter().filter_map(|(at, hole_m)| Some(hole_m - other.holes_m.get(at)?));
         let differences: Vec<f64> = both.collect();

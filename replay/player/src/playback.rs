@@ -91,9 +91,9 @@ pub struct Playback<'a> {
 enum Mode {
     Playing,
     Paused,
-    /// Number of ticks to run before playback pauses.
+    /// Number of ticks left to run before playback pauses.
     Stepping(u32),
-    /// Plays until a section is judged.
+    /// Plays until the next section is judged, then pauses.
     SteppingSection,
 }
 

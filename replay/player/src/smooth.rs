@@ -25,11 +25,11 @@ use headrace_vehicle::VehicleConfig;
 ///
 /// A tick spans a minute at most, with ten epochs per second and up to three steps per epoch.
 const QUEUED: usize = 4096;
-/// Length of a record, bytes.
+/// Length of a stored filter step, bytes.
 const RECORD: usize = 8 * WORDS;
-/// Number of records per read.
+/// Number of stored filter steps read at once.
 const BLOCK: u64 = 256;
-/// Maximum number of file names tried.
+/// Maximum number of names tried for the temporary file.
 const NAMES: u32 = 1000;
 
 /// Reason why a dive could not be smoothed.
@@ -54,10 +54,10 @@ pub enum SmoothError {
         /// Capacity of the queue, steps.
         queued: usize,
     },
-    /// A record that was read back differs from the one written.
+    /// A filter step read back from the file is invalid, so it differs from the one written.
     #[error("reading the filter's steps back: record {record} is damaged")]
     Damaged {
-        /// Record number, from zero.
+        /// Index of the damaged filter step in the file, from 0.
         record: u64,
     },
 }

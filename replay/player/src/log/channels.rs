@@ -23,7 +23,7 @@ pub(super) enum ChannelKind {
     Other,
 }
 
-/// A known channel.
+/// A channel whose definition was found in the log.
 #[derive(Debug, Clone)]
 pub(super) struct Channel {
     pub(super) definition: Definition,

@@ -15,7 +15,7 @@ use super::framing::{ChunkPlace, LogFile};
 use super::limits::{MAX_UNPACKED_BYTES, MAX_WINDOW_LOG, RECORD_COST};
 use super::{LogError, LossKind};
 
-/// Read size, bytes.
+/// Number of bytes read from the file at once.
 const READ_BYTES: usize = 1 << 20;
 
 /// Result of unpacking a chunk.

@@ -54,7 +54,7 @@ pub struct DiveLog<R = File> {
     /// For each source of the file being read, its source number in the dive.
     numbers: Vec<u16>,
     topics: Vec<String>,
-    /// Losses between files.
+    /// Losses before, between and after the files, such as missing parts.
     between: Vec<Loss>,
     /// Losses of the files already read.
     earlier: Vec<Loss>,

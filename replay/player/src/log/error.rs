@@ -28,7 +28,7 @@ pub enum LogError {
     Read {
         /// Name of the log, given by the caller.
         name: String,
-        /// Offset, bytes.
+        /// Offset in the log at which reading failed, bytes.
         offset: u64,
         /// Error of the system.
         source: io::Error,
@@ -46,7 +46,7 @@ pub enum LogError {
     Encode {
         /// Item that was being written.
         what: &'static str,
-        /// Reason, as text.
+        /// Reason why MCAP can't represent the item, as text.
         source: mcap::McapError,
     },
     /// The file isn't an MCAP file.
@@ -81,7 +81,7 @@ pub enum LogError {
         path.display()
     )]
     NotAPart {
-        /// Path of that log.
+        /// Path of the log that isn't part of a recording.
         path: PathBuf,
     },
     /// The files are parts of different recordings.
@@ -90,35 +90,35 @@ pub enum LogError {
         one.display(), other.display()
     )]
     OtherDive {
-        /// A part of one recording.
+        /// Path of a part of one recording.
         one: PathBuf,
-        /// Identifier of that recording.
+        /// Identifier of the recording that `one` belongs to.
         one_dive: String,
-        /// A part of another recording.
+        /// Path of a part of another recording.
         other: PathBuf,
-        /// Identifier of that recording.
+        /// Identifier of the recording that `other` belongs to.
         other_dive: String,
     },
     /// Two files have the same part number.
     #[error("{} and {} are both part {number} of the recording; name one of them", one.display(), other.display())]
     PartTwice {
-        /// The part number.
+        /// Part number that both files have.
         number: u32,
-        /// One of the files.
+        /// Path of one of the files.
         one: PathBuf,
-        /// The other file.
+        /// Path of the other file.
         other: PathBuf,
     },
     /// The topic of a result doesn't begin with the result prefix.
     #[error("topic {topic:?} of a result must begin with {:?}", super::format::RESULT_PREFIX)]
     Topic {
-        /// The topic.
+        /// Topic of the result.
         topic: String,
     },
     /// The header declares no channel for a message.
     #[error("a message for {channel}, which the log's header does not announce")]
     NoChannel {
-        /// Kind and number of the channel.
+        /// Kind and number of the undeclared channel.
         channel: String,
     },
     /// A tick has more packets than a tick message can count.
@@ -138,7 +138,7 @@ pub enum LogError {
         "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; how much of the log is on it isn't known"
     )]
     Stuck {
-        /// Time that was waited, s.
+        /// Time that the program has waited for the medium, s.
         waited_s: u64,
     },
     /// The recorder's thread has panicked, which is a bug.

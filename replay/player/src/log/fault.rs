@@ -57,7 +57,7 @@ pub enum RecordingEvent {
         /// The failed action, and the error of the system.
         error: String,
     },
-    /// The recording continues.
+    /// The recording continues in another part after a fault.
     Resumed(RecordingFault),
     /// The medium accepts no data, but reports no error. The queue is full, so new data isn't recorded.
     Behind,

@@ -134,7 +134,7 @@ pub(super) fn stated_loss(from: Option<MonoNs>, to: Option<MonoNs>, words: &str)
     format!("{} {} {words}", time(from), time(to))
 }
 
-/// Parses the text of [`stated_loss`] into from, to and words.
+/// Parses the text of [`stated_loss`] into start time, end time and words.
 pub(super) fn read_loss(text: &str) -> (Option<MonoNs>, Option<MonoNs>, &str) {
     let mut parts = text.splitn(3, ' ');
     let mut time = || parts.next().and_then(|time| time.parse().ok()).map(MonoNs);

@@ -47,7 +47,7 @@ impl<R: Read + Seek> LogFile<R> {
         self.medium().len()
     }
 
-    /// Returns the medium of the file.
+    /// Returns the medium that the file is on.
     pub(super) fn medium(&self) -> &Medium<R> {
         self.input.get_ref()
     }
@@ -194,7 +194,7 @@ pub(super) struct Frame {
     pub(super) confirmed: bool,
 }
 
-/// Content found at a position.
+/// Content found at a position of a log file.
 #[derive(Debug)]
 pub(super) enum Found {
     /// A record that lies within the file.
@@ -412,7 +412,7 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     Some((item, fields.taken()))
 }
 
-/// Returns the item, and the record length that a list at the end of the record implies.
+/// Reads the length of the list that ends a record. Returns the item, and the record length that the list implies.
 fn with_list(mut fields: Fields<'_>, item: Item) -> Option<(Item, u64)> {
     let len = fields.u32()?;
     Some((item, fields.taken() + u64::from(len)))

@@ -24,7 +24,7 @@ pub(super) const MAX_UNPACKED_RATIO: u64 = 512;
 const UNPACKED_ANYWAY: u64 = 64 << 20;
 /// Maximum window of a chunk packed by zstd, as a power of two: 16 MiB. Levels up to 19 use less.
 pub(super) const MAX_WINDOW_LOG: u32 = 24;
-/// Maximum memory of overlapping pieces that are being merged, bytes. One more piece may exceed it.
+/// Memory limit for overlapping pieces being merged, bytes. At most one piece may exceed the limit.
 pub(super) const MAX_HELD_BYTES: usize = 32 << 20;
 /// Maximum number of pieces, which are chunks and runs of messages outside chunks. Three days of half-second chunks
 /// fit.
@@ -52,12 +52,12 @@ pub(super) fn map_cost(entries: u64, bytes: u64) -> u64 {
     entries.saturating_mul(ENTRY_COST).saturating_add(bytes)
 }
 
-/// Bytes in use out of [`MAX_HEADER_BYTES`].
+/// Memory in use by definitions and metadata, bytes, at most [`MAX_HEADER_BYTES`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct HeaderBudget(u64);
 
 impl HeaderBudget {
-    /// Reserves memory. Returns `false`, and reserves nothing, if there isn't enough.
+    /// Reserves memory for definitions or metadata. Returns `false`, and reserves nothing, if there isn't enough.
     pub(super) fn take(&mut self, cost: u64) -> bool {
         let used = self.0.saturating_add(cost);
         let fits = used <= MAX_HEADER_BYTES;
@@ -67,7 +67,7 @@ impl HeaderBudget {
         fits
     }
 
-    /// Releases reserved memory.
+    /// Releases memory reserved for definitions or metadata.
     pub(super) fn give_back(&mut self, cost: u64) {
         self.0 = self.0.saturating_sub(cost);
     }

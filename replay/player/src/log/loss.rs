@@ -28,24 +28,24 @@ pub enum LossKind {
     Compression(String),
     /// A chunk or attachment that exceeds the limit for reading into memory.
     TooLarge {
-        /// Limit, bytes.
+        /// Maximum length of a chunk or attachment, bytes.
         limit: u64,
     },
     /// Chunks that would unpack to many times the length of the log. None of their messages is delivered.
     Swells {
-        /// Limit, as a multiple of the log's length up to the chunk.
+        /// Maximum unpacked length, as a multiple of the log's length up to the chunk.
         limit: u64,
     },
     /// A chunk that would take more memory to unpack than allowed.
     Window {
-        /// Limit, bytes.
+        /// Maximum memory for unpacking a chunk, bytes.
         limit: u64,
     },
-    /// There are more items of a kind than allowed.
+    /// The log has more items of a kind, such as channels, than allowed.
     Beyond {
-        /// Kind of item.
+        /// Kind of item that exceeds its limit.
         what: Many,
-        /// Limit.
+        /// Maximum number of items of this kind, or their maximum memory.
         limit: u64,
     },
     /// Messages with a timestamp later than allowed.
@@ -98,7 +98,7 @@ pub enum LossKind {
     InPart {
         /// Part number.
         part: u32,
-        /// The damage.
+        /// Damage in that part.
         kind: Box<LossKind>,
     },
     /// Parts missing from a recording; the last one is `None` if unknown.
@@ -114,7 +114,7 @@ pub enum LossKind {
         part: u32,
         /// Number of messages up to the end of this part, as this part states it.
         messages: u64,
-        /// The same number, as the next part's header states it.
+        /// Number of messages up to the end of this part, as the next part's header states it.
         wanted: u64,
     },
     /// A part of a recording that isn't an MCAP file.
@@ -164,11 +164,11 @@ impl Many {
 /// A loss: a damaged range of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Loss {
-    /// The damage.
+    /// Kind of damage.
     pub kind: LossKind,
-    /// Offset in the file, bytes.
+    /// Offset of the damaged range in the file, bytes.
     pub offset: u64,
-    /// Length in the file, bytes.
+    /// Length of the damaged range in the file, bytes.
     pub bytes: u64,
     /// Last receive time before the loss; `None` if unknown.
     pub from: Option<MonoNs>,

@@ -32,7 +32,7 @@ impl<R: Read + Seek> Medium<R> {
         self.len
     }
 
-    /// Whether any of these bytes couldn't be read.
+    /// Whether any byte of this range couldn't be read.
     pub(super) fn has_failed_within(&self, part: &Range<u64>) -> bool {
         self.failed.iter().any(|failed| failed.start < part.end && part.start < failed.end)
     }

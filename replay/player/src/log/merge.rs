@@ -108,7 +108,7 @@ impl Merge {
         batch
     }
 
-    /// Adds the messages of piece number `span`, beginning with message number `next`.
+    /// Adds the messages of the piece with index `span`, beginning with the message with index `next`.
     pub(super) fn add(&mut self, span: usize, mut batch: Batch, next: usize) {
         if self.by_time {
             batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));

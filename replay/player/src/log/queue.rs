@@ -13,13 +13,13 @@ use super::fault::RecordingEvent;
 use super::fields::Fields;
 use super::writer::Lane;
 
-/// An entry doesn't fit in the queue. Nothing of it was written.
+/// An entry doesn't fit in the queue. No part of the entry was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
 pub struct Full {
-    /// Free bytes.
+    /// Number of free bytes in the queue.
     pub free: usize,
-    /// Bytes needed.
+    /// Number of bytes that the entry needs.
     pub needed: usize,
 }
 
@@ -46,9 +46,9 @@ pub(super) struct State {
     /// Bytes that port threads sent to devices. They don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
-    /// Packets that the lines dropped before the loop could receive them.
+    /// Packets that the connections to devices dropped before the loop could receive them.
     pub(super) dropped: ArrayQueue<Dropped>,
-    /// Number of dropped packets whose records didn't fit in `dropped`.
+    /// Number of dropped packets that aren't in `dropped`, because that queue was full.
     pub(super) dropped_besides: AtomicU64,
     /// Recordings of voice notes. They don't pass through the loop either.
     pub(super) voices: ArrayQueue<Vec<u8>>,
@@ -58,7 +58,7 @@ pub(super) struct State {
 }
 
 impl State {
-    /// Notes the time of a tick that the loop has recorded or skipped.
+    /// Stores the time of a tick that the loop has recorded or skipped.
     pub(super) fn hand(&self, now: MonoNs) {
         // The dive's time begins with the first tick. Earlier data doesn't count as unsynced.
         if self.handed_ns.swap(now.0, Ordering::Relaxed) == 0 {
@@ -98,7 +98,7 @@ pub(super) struct Dropped {
     pub(super) packets: u64,
 }
 
-/// Records line traffic that doesn't pass through the loop. Any thread may use it.
+/// Records traffic on the connections to devices that doesn't pass through the loop. Any thread may use it.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,
@@ -211,7 +211,7 @@ impl Drop for ClosedWhenDropped {
     }
 }
 
-/// An entry without its message.
+/// Header of a queue entry, without the entry's message.
 pub(super) struct Entry {
     pub(super) lane: Lane,
     pub(super) log_time: MonoNs,

@@ -31,9 +31,10 @@ const PRIVATE: u8 = 0x80;
 pub struct LogInfo {
     /// Text of the vehicle file; `None` if the log has none, or it isn't valid UTF-8.
     pub vehicle_toml: Option<String>,
-    /// Name and content of each other attachment.
+    /// Name and content of each attachment other than the vehicle file.
     pub attachments: Vec<(String, Vec<u8>)>,
-    /// Metadata. Entries of this program's own record have their key, others have `<name of the record>/<key>`.
+    /// Metadata of the log. Entries of this program's own record keep their key. Other entries have the key `<name of
+    /// the record>/<key>`.
     pub metadata: BTreeMap<String, String>,
     /// The sources. A source's index is its number in [`MessageKind`].
     ///

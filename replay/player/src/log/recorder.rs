@@ -315,7 +315,7 @@ impl RecorderHandle {
         self.state.unsafe_for()
     }
 
-    /// Returns a port for line traffic that doesn't pass through the loop.
+    /// Returns a port that records traffic with devices that doesn't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }

@@ -119,7 +119,7 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     Ok((scan, channels))
 }
 
-/// Returns the loss for exceeding a limit.
+/// Returns the kind of loss that reports content beyond a limit.
 pub(super) fn beyond(what: Many) -> LossKind {
     let limit = match what {
         Many::Pieces => MAX_PIECES as u64,
@@ -527,7 +527,7 @@ impl Span {
         })
     }
 
-    /// Whether the times are valid. A chunk without messages has no times.
+    /// Whether the piece has times. A chunk without messages has none: both are 0.
     pub(super) fn is_dated(&self) -> bool {
         (self.from, self.to) != (0, 0)
     }

@@ -22,9 +22,9 @@ pub struct Trim<'a> {
     pub spans: Vec<(MonoNs, MonoNs)>,
     /// Description of the changes, for the log's metadata.
     pub words: String,
-    /// Changes the log's header.
+    /// Function that changes the log's header.
     pub header: &'a dyn Fn(&LogInfo, LogHeader) -> LogHeader,
-    /// Changes source messages.
+    /// Function that changes source messages.
     pub change: Change<'a>,
     /// Whether to keep voice recordings within the spans.
     pub voices: bool,

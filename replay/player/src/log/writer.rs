@@ -442,7 +442,7 @@ fn write_metadata<W: Write>(
     Ok(())
 }
 
-/// Number of bytes passed to the medium, and whether more may be passed.
+/// Number of bytes passed to the medium so far, and whether more may be passed.
 #[derive(Default)]
 struct Medium {
     bytes: AtomicU64,

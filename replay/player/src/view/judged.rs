@@ -20,7 +20,7 @@ const MOST_STRETCHES: usize = 40;
 /// Judgements of all sections so far.
 #[derive(Debug, Default)]
 pub(super) struct Sections {
-    /// Flagged sections, each with its cause and the diameter of its hole, m.
+    /// Flagged sections by number, each with its cause and the diameter of its hole, m.
     flagged: BTreeMap<i64, (Cause, f64)>,
     /// First and last section of each missed run.
     runs: BTreeMap<u64, (i64, i64)>,
@@ -99,7 +99,7 @@ impl Sections {
         })
     }
 
-    /// Makes the next list due at once.
+    /// Makes the next list of missed stretches due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }

@@ -90,7 +90,7 @@ impl Wall {
         self.indices.contains(&index).then(|| self.columns.entry(index).or_insert_with(new))
     }
 
-    /// Makes the next grid due at once.
+    /// Makes the next grid of the wall due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }

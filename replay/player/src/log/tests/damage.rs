@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::super::{LogError, LogInfo, LogWriter, LossKind};
 use super::*;
 
-/// Number of messages in each chunk of [`log`], and number of chunks.
+/// Number of messages in each chunk of the log under test, and number of chunks.
 const PER_CHUNK: usize = 6;
 const CHUNKS: usize = 6;
 
@@ -168,7 +168,7 @@ fn long_chunk_cut_anywhere_delivers_messages_before_the_cut() {
 }
 
 #[test]
-fn chunk_with_zeroed_head_is_a_loss() {
+fn chunk_with_zeroed_header_is_reported_as_a_loss() {
     let (bytes, seen) = long_log();
     for chunk in &places(&bytes, op::CHUNK)[1..] {
         let mut bytes = bytes.clone();
@@ -180,7 +180,7 @@ fn chunk_with_zeroed_head_is_a_loss() {
 }
 
 #[test]
-fn losses_by_thousands_of_random_changes_are_reported() {
+fn every_message_lost_to_random_changes_is_reported() {
     let (bytes, seen) = long_log();
     let info = open(&bytes).header().clone();
     let words = noise(11, 12_000);

@@ -228,7 +228,7 @@ fn damaged_chunk_is_reported_as_one_loss() {
 }
 
 #[test]
-fn numbering_losses_after_going_back_equal_those_of_a_straight_read() {
+fn numbering_losses_after_resuming_at_an_earlier_position_are_unchanged() {
     each(|what, records| {
         let mut records = without_summary(records);
         let places = chunks(&records);

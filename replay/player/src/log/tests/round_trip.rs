@@ -90,7 +90,7 @@ fn equal_messages_give_equal_log_bytes() {
 }
 
 #[test]
-fn chunks_are_closed_by_size() {
+fn chunk_is_closed_when_it_reaches_its_maximum_size() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for at in 0..40 {
         log.raw(0, MonoNs(at), MonoNs(at), &vec![7; 100_000]).unwrap();
