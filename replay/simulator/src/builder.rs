@@ -31,7 +31,7 @@ pub struct Added {
     pub trajectory: Option<String>,
 }
 
-/// Position in the chain of systems.
+/// Position of a system in the chain that the schedule runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 struct Slot(usize);
 
@@ -90,7 +90,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Facts of the scene.
+    /// Facts about the scene's vehicle and tunnel.
     pub fn facts(&self) -> &'a Facts {
         self.facts
     }
@@ -118,7 +118,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// A sensor's mount as changed by the effects so far.
+    /// Mount of a sensor on the vehicle, as changed by the effects so far.
     pub fn mount(&self, source: usize) -> Option<Mount> {
         self.world.get::<Mounted>(*self.entities.get(source)?).map(|mounted| mounted.0)
     }

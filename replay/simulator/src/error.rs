@@ -15,15 +15,15 @@ pub enum SceneError {
          through {what}"
     )]
     Blocked {
-        /// Time after the start, s.
+        /// Time after the start at which the vehicle meets the obstacle, s.
         after_s: f64,
-        /// Chainage, m.
+        /// Chainage of the vehicle at that time, m.
         chainage_m: f64,
-        /// Distance to the left of the axis, m.
+        /// Distance of the vehicle to the left of the axis, m.
         y_m: f64,
-        /// Height above the floor, m.
+        /// Height of the vehicle above the floor, m.
         z_m: f64,
-        /// The obstacle.
+        /// Name of the obstacle.
         what: String,
     },
     /// An effect is inconsistent with the scene.
@@ -31,7 +31,7 @@ pub enum SceneError {
     Effect {
         /// Name of the effect.
         effect: &'static str,
-        /// The inconsistency, as text.
+        /// The inconsistency between effect and scene, as text.
         problem: String,
     },
 }

@@ -14,7 +14,7 @@ pub struct Facts {
     pub sensors: Vec<SensorFacts>,
     /// Parts of the vehicle that may hide a head's view.
     pub hull: Vec<Obstacle>,
-    /// Whether a current would carry the vehicle.
+    /// Whether the trajectory's speeds are relative to the water, so that a current carries the vehicle.
     pub ground: Ground,
     /// Length of the tunnel, m.
     pub length_m: f64,
@@ -31,9 +31,9 @@ pub struct SensorFacts {
     pub id: String,
     /// Quantity that the sensor measures.
     pub sense: Sense,
-    /// Specification, if the sensor is a head.
+    /// Specification of the head, if the sensor is a head.
     pub head: Option<HeadSpec>,
-    /// Program, if the sensor is a head.
+    /// Program of the head, if the sensor is a head.
     pub program: Option<HeadProgram>,
 }
 

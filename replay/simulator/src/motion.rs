@@ -8,7 +8,7 @@ use headrace_sensor::reading::Level;
 
 use crate::sensing::Scenery;
 
-/// The sample at `at` of an inertial unit that samples every `period`.
+/// The sample at time `at` of an inertial unit that samples every `period`.
 ///
 /// Rate and acceleration are means over the period, as in a unit that integrates between samples. The sums of the
 /// samples give the whole change of attitude and velocity, even over a jerk between samples. At constant attitude and
@@ -31,7 +31,7 @@ pub(crate) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) 
 /// Half the averaging time of a velocity log.
 const HALF_PING: DurNs = DurNs::from_millis(5);
 
-/// Velocity of the sensor's mounting point at `at`, m/s.
+/// Velocity of the sensor's mounting point at time `at`, m/s.
 pub(crate) fn velocity(truth: &Scenery, mount: &Mount, at: MonoNs) -> Vec3<Sensor> {
     let (early, late) = (at - HALF_PING, at + HALF_PING);
     let place = |at| truth.pose(at).place(mount.position);

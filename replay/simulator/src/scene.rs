@@ -19,11 +19,11 @@ const LONGEST_S: f64 = 1e9;
 
 /// A parsed and checked scene.
 pub struct Scene {
-    /// Name for display.
+    /// Name of the scene for display.
     pub name: String,
     /// Text of the vehicle file, which is written to the log.
     pub vehicle_text: String,
-    /// The vehicle.
+    /// The vehicle, as parsed from its file.
     pub vehicle: VehicleConfig,
     /// Programs of the heads, in the order of the vehicle file.
     pub programs: Vec<HeadProgram>,

@@ -19,7 +19,7 @@ use crate::trajectory::Trajectory;
 /// Interval at which the trajectory is checked, s.
 const CHECK_S: f64 = 0.5;
 
-/// Time span to simulate.
+/// Time slice: the span of the dive that is simulated at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Resource)]
 pub(crate) struct Slice {
     /// Start of the slice.
@@ -45,11 +45,11 @@ pub struct Scenery {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Source(pub u16);
 
-/// Mount on the vehicle.
+/// Mount of a sensor on the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Mounted(pub Mount);
 
-/// The simulated device at its end of the line.
+/// The simulated device at the far end of its line.
 #[derive(Component)]
 pub(crate) struct Device<M: Measurement>(pub Box<dyn Emulator<M>>);
 
@@ -61,13 +61,13 @@ pub(crate) struct Head(pub HeadSpec);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Echosounder;
 
-/// Measurements in the slice, in order of time.
+/// Measurements of a sensor in the current time slice, in order of time.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Samples<M: Measurement> {
     /// Number of the first sample, counted from the start of the dive. It is the step for the random numbers of
     /// effects.
     pub first: u64,
-    /// The measurements.
+    /// The measurements, in order of time.
     pub list: Vec<M>,
 }
 
@@ -75,12 +75,12 @@ pub(crate) struct Samples<M: Measurement> {
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Rays(pub Vec<Ray>);
 
-/// Axis of a beam.
+/// Ray along the axis of a sonar's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ray {
     /// Position of the sonar.
     pub origin: Point3<Tunnel>,
-    /// Direction, a unit vector.
+    /// Direction of the beam, a unit vector.
     pub direction: Vec3<Tunnel>,
     /// Hit of the ray; `None` if nothing is within reach.
     pub hit: Option<Hit>,
@@ -90,7 +90,7 @@ pub(crate) struct Ray {
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Reach(pub f64);
 
-/// Messages on a line in the slice.
+/// Messages on a device's line in the current time slice.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Line {
     /// The messages in the order in which the device sent them.
@@ -104,7 +104,7 @@ pub(crate) struct Line {
 pub(crate) struct LineMessage {
     /// Time at which the first byte crosses the line.
     pub at: MonoNs,
-    /// Direction.
+    /// Direction of the message: to or from the device.
     pub direction: Direction,
     /// Start and end of the message in [`Line::bytes`].
     pub bytes: (usize, usize),
@@ -119,7 +119,7 @@ impl<M: Measurement> Default for Samples<M> {
 }
 
 impl<M: Measurement> Samples<M> {
-    /// The measurements, each with its step number.
+    /// The measurements of the time slice, each with its step number.
     pub(crate) fn steps(&mut self) -> impl Iterator<Item = (u64, &mut M)> {
         (self.first..).zip(&mut self.list)
     }

@@ -13,7 +13,7 @@ use crate::sensing::{Device, Echosounder, Head, Line, Mounted, Ray, Rays, Reach,
 
 /// Name of the system [`aim_held`]. Effects use the name to replace the system.
 pub(crate) const AIM_HELD: &str = "aim_held";
-/// Tolerance for a whole turn, radians.
+/// Tolerance within which a rotation counts as a whole turn, radians.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
 /// Order of processing in a slice. Within a stage, base systems run first, then effects in the order of
@@ -39,7 +39,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Name for display.
+    /// Name of the stage for display.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Begin => "begin",

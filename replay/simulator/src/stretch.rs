@@ -5,9 +5,9 @@ use headrace_config::{ConfigError, Section};
 /// A stretch of the tunnel: chainages from `from_m` up to, but not including, `to_m`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stretch {
-    /// Start, m; minus infinity if the stretch has no start.
+    /// Chainage of the start, m; minus infinity if the stretch has no start.
     pub from_m: f64,
-    /// End, m; infinity if the stretch has no end.
+    /// Chainage of the end, m; infinity if the stretch has no end.
     pub to_m: f64,
 }
 

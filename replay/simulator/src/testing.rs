@@ -12,18 +12,18 @@ use crate::{Scene, SceneError, Simulation, TruthRow};
 /// A vehicle that moves forward in a tunnel for `seconds` at a constant speed, with the effects of a scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Dive {
-    /// Keys of `[tunnel]`.
+    /// Keys of the scene's table `[tunnel]`.
     pub(crate) tunnel: &'static str,
     /// Id, plugin and further keys of each sensor.
     pub(crate) sensors: Vec<(&'static str, &'static str, String)>,
     /// More tables of the vehicle file.
     pub(crate) vehicle: &'static str,
-    /// Keys of `[trajectory]`.
+    /// Keys of the scene's table `[trajectory]`.
     pub(crate) trajectory: &'static str,
     pub(crate) seconds: f64,
     pub(crate) speed_mps: f64,
     pub(crate) seed: u64,
-    /// Length of a slice; `None` for the default.
+    /// Length of the simulation's time slices; `None` for the default.
     pub(crate) slice: Option<DurNs>,
 }
 
@@ -36,10 +36,10 @@ pub(crate) struct Said {
     pub(crate) bytes: Vec<u8>,
 }
 
-/// Result of a dive.
+/// Result of a simulated dive.
 #[derive(Debug, Clone)]
 pub(crate) struct Dived {
-    /// Messages in order of time, then source.
+    /// Ground truth of the measurements, in order of time, then source.
     pub(crate) rows: Vec<TruthRow>,
     pub(crate) messages: Vec<Said>,
 }
@@ -124,7 +124,7 @@ impl Dive {
         }
     }
 
-    /// Asserts that a scene gives the same result for any length of slice.
+    /// Asserts that a scene gives the same result for any length of the simulation's time slices.
     pub(crate) fn assert_slices_dont_matter(&self, effects: &str) {
         let usual = self.dive(effects);
         assert!(!usual.rows.is_empty());
@@ -148,7 +148,7 @@ impl Dived {
         measured.map(|sounding| (sounding.angle_rad, sounding.range_m)).collect()
     }
 
-    /// The ranges of a source, in order.
+    /// Ranges that a source has measured, in order.
     pub(crate) fn ranges_m(&self, source: u16) -> Vec<Option<f64>> {
         self.soundings(source).into_iter().map(|(_, range_m)| range_m).collect()
     }

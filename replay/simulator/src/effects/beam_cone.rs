@@ -83,7 +83,7 @@ struct BeamCone {
     cone: Cone,
     form: Form,
     bins: Bins,
-    /// Hits of the current ping's rays.
+    /// Hits of the rays within the cone of the current ping.
     hits: Vec<Option<Hit>>,
 }
 

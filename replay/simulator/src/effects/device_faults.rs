@@ -41,7 +41,7 @@ enum Fault {
     Babble,
 }
 
-/// A span of time. Its end is excluded.
+/// Time span of a fault. Its end is excluded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Span {
     from: MonoNs,

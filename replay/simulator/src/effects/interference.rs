@@ -54,7 +54,7 @@ const APART_M: f64 = 70.0;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
-    /// Heads with the same number share a frequency.
+    /// Number of the group of heads. Heads with the same number share a frequency.
     frequency: usize,
     share: f64,
     margin_rad: Option<f64>,
@@ -166,7 +166,7 @@ struct Ear<'a> {
     ray: &'a Ray,
     stopped: bool,
     step: u64,
-    /// Range limits between which a sound is taken as the echo, m.
+    /// Least and largest range at which the head takes a sound as its echo, m.
     within_m: [f64; 2],
     /// Whether another head's ping has been heard.
     heard: bool,

@@ -16,7 +16,7 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// The quantities that sensors measure.
+/// Quantities whose sensors may have delayed messages.
 pub(super) const SENSES: [Sense; 6] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether];
 
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_zero_delay_is_refused() {
+    fn time_slice_length_changes_nothing_and_zero_delay_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.line_delay]\n").contains("or jitter_ms must not be zero"));
     }

@@ -54,7 +54,7 @@ struct Ramp {
 struct MissingReturns {
     places: Places<Parameters>,
     stream: Stream,
-    /// Whether the last ping was lost in a run; `None` before the first ping.
+    /// Whether the last ping was lost as part of a run; `None` before the first ping.
     in_run: Option<bool>,
 }
 
@@ -134,7 +134,7 @@ impl Parameters {
     }
 }
 
-/// The echo of a ping before this effect.
+/// The echo of a ping before this effect removes any.
 #[derive(Debug, Clone, Copy)]
 struct Echo {
     range_m: Option<f64>,
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.missing_returns]\nshare = 0.3\nmean_run = 20");
     }
 

@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.near_returns]\nshare = 0.3\nmean_run = 9");
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.near_returns]\n{keys}"));
         assert!(refusal("").contains("share: must be above zero"));

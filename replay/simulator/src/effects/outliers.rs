@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_sounder().assert_slices_dont_matter("[effects.outliers]");
     }
 

@@ -33,7 +33,7 @@ struct Parameters {
 struct SectorEndSlowing {
     lag_s: f64,
     commanded: Option<(MonoNs, f64)>,
-    /// Lag of the head behind its command, radians.
+    /// Current lag of the head behind its command, radians.
     behind_rad: f64,
 }
 
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_heads_without_a_sector_are_refused() {
+    fn time_slice_length_changes_nothing_and_heads_without_a_sector_are_refused() {
         same_in_any_slices(&Bench::sectors(KEYS));
         let why = refusal("[effects.sector_end_slowing]\n");
         assert!(why.contains("none of its heads turns in a sector"), "{why}");

@@ -33,7 +33,7 @@ use crate::stages::Stage;
 /// the beam itself away.
 pub(super) struct SideLobesKind;
 
-/// Angle from the beam's axis to the first side lobe, in full widths of the beam.
+/// Angle from the beam's axis to the first side lobe, as a multiple of the beam's full width.
 const LOBE_WIDTHS: f64 = 5.136 / 1.616 / 2.0;
 /// Full width of an echosounder's beam, degrees; see the effect beam_cone.
 const ECHOSOUNDER_DEG: f64 = 30.0;
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.side_lobes]\nshare = 0.5");
     }
 

@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_error]\nshare = 0.01");
     }
 

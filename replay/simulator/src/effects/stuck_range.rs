@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.stuck_range]\nfrom_s = 2");
     }
 

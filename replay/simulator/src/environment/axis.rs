@@ -24,11 +24,11 @@ pub struct Axis {
 /// A straight piece or an arc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
-    /// Chainage of the start of the piece.
+    /// Chainage of the start of the piece, m.
     pub(super) from_m: f64,
-    /// Chainage of the end of the piece.
+    /// Chainage of the end of the piece, m.
     pub(super) to_m: f64,
-    /// Chainage of the point `at`: an end of a straight piece, or the middle of an arc.
+    /// Chainage of the point `at`, m: an end of a straight piece, or the middle of an arc.
     anchor_m: f64,
     at: Yz,
     heading_rad: f64,

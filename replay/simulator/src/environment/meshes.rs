@@ -19,9 +19,9 @@ use crate::mesh::{self, Mesh, Role};
 
 /// Allowed chainage of the origin of a mesh, m. The origin of a survey may be far away.
 const CHAINAGE_M: core::ops::RangeInclusive<f64> = -1.0e5..=1.0e5;
-/// Allowed position of the origin across the tunnel, m.
+/// Allowed position of the origin of a mesh across the tunnel, m.
 const ACROSS_M: core::ops::RangeInclusive<f64> = -1000.0..=1000.0;
-/// Minimum length of a wall, m.
+/// Minimum length of a mesh that is a stretch of wall, m.
 const SHORTEST_M: f64 = 0.01;
 
 /// Position of the origin of a mesh.

@@ -75,14 +75,14 @@ pub struct Environment {
     names: Vec<String>,
 }
 
-/// End of a ray.
+/// End of a ray at the wall or at an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Range, m. On a rough wall, the range includes the roughness.
+    /// Range from the ray's origin, m. On a rough wall, the range includes the roughness.
     pub range_m: f64,
-    /// Position. On a rough wall, the position lies on the smooth wall underneath.
+    /// Position of the hit. On a rough wall, the position lies on the smooth wall underneath.
     pub point: Point3<Tunnel>,
-    /// Unit normal at the position, towards the water.
+    /// Unit normal of the surface at the hit, towards the water.
     pub normal: Vec3<Tunnel>,
     /// Object that the ray hit.
     pub what: What,
@@ -395,7 +395,7 @@ impl Environment {
             .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Number of the feature whose solid contains a point.
+    /// Number of the feature that contains a point in a solid.
     fn solid_around(&self, point: V3) -> Option<u16> {
         let [chainage_m, ..] = self.axis().chart(to_point(point));
         let near = self.solids_by_chainage.near(chainage_m, chainage_m).iter();

@@ -46,7 +46,7 @@ pub(crate) struct Described {
     thrusters: Option<Thrusters>,
 }
 
-/// Silt in the water.
+/// Silt in the tunnel's water.
 #[derive(Debug, Clone, Copy)]
 struct Murk {
     stretch: Stretch,
@@ -59,7 +59,7 @@ struct Murk {
 struct Leak {
     chainage_m: f64,
     flow_m3ps: f64,
-    /// Whether the water comes from the portal rather than from the far end of the tunnel.
+    /// Whether the water of the leak comes from the portal rather than from the far end of the tunnel.
     from_portal: bool,
 }
 

@@ -41,18 +41,18 @@ pub struct Called {
 /// Whether and how an implied effect is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
-    /// Simulated as implied.
+    /// The effect is simulated with its implied tables.
     Taken,
-    /// Simulated with the tables in the scene.
+    /// The effect is simulated with the tables in the scene.
     Named,
-    /// Not simulated: the scene asks only for named effects.
+    /// The effect isn't simulated: the scene asks only for the effects that it names.
     NotTaken,
-    /// Not simulated: the key `leave` lists the effect.
+    /// The effect isn't simulated: the key `leave` lists it.
     Left,
 }
 
 impl Fate {
-    /// Text for display.
+    /// Whether and how the effect is simulated, as text for display.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Taken => "taken",

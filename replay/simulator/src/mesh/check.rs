@@ -21,18 +21,19 @@ pub enum Role {
 const FAR_M: f64 = 100_000.0;
 /// Largest distance between welded vertices, as a share of the mesh's diagonal.
 const WELD: f64 = 1e-9;
-/// Largest distance of a wall's opening from an end, as a share of the wall's length. [`END_M`] applies if it is
-/// larger.
+/// Largest distance of a wall's opening from an end of the mesh, as a share of the wall's length. [`END_M`] applies
+/// if it is larger.
 const END: f64 = 0.02;
-/// Alternative to [`END`], metres. Either distance is limited to a quarter of the length, which keeps the ends apart.
+/// Largest distance of a wall's opening from an end of the mesh, metres, where it exceeds the share [`END`]. Both
+/// limits are at most a quarter of the length, which keeps the ends apart.
 const END_M: f64 = 0.5;
 
-/// A checked surface.
+/// A checked surface of triangles.
 #[derive(Debug, Clone)]
 pub(super) struct Surface {
     pub(super) vertices: Vec<[f64; 3]>,
     pub(super) faces: Vec<[u32; 3]>,
-    /// Number of each face in the input.
+    /// Number that each face has in the input.
     pub(super) given: Vec<u32>,
     /// Caps that close the openings of a wall.
     pub(super) caps: Vec<Cap>,
@@ -48,7 +49,7 @@ pub(super) struct Cap {
     pub(super) high: [f64; 3],
 }
 
-/// An opening: connected edges that belong to only one face each.
+/// A hole in the surface: connected edges that belong to only one face each.
 struct Hole {
     edges: Vec<[u32; 2]>,
     low_x: f64,

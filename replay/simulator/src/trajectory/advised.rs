@@ -28,7 +28,7 @@ const MOST_STOOD_S: f64 = 120.0;
 /// Time that the pilot waits for further advice at the end, s.
 const WAITS_S: f64 = 10.0;
 
-/// The advice at one time.
+/// The monitor's advice to the pilot at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PilotAdvice {
     /// Time of the advice.
@@ -52,12 +52,12 @@ pub(super) struct Hurry {
 /// Parameters of a pilot.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heeding {
-    /// Chainage of the start and the end, m. The end has the larger chainage.
+    /// Chainages of the dive's start and end, m. The end has the larger chainage.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
     /// Position in the cross-section about which the vehicle drifts: y, z, m.
     pub(super) across_m: [f64; 2],
-    /// Maximum speed, m/s.
+    /// Maximum speed of the vehicle, m/s.
     pub(super) speed_mps: f64,
     /// Delay between advice and action, at least 3 s.
     pub(super) lag_s: f64,
@@ -86,7 +86,7 @@ enum Doing {
     Done,
 }
 
-/// The pilot and the motion decided so far.
+/// The advised pilot, and the trajectory decided so far.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Advised {
     pilot: Heeding,
@@ -101,7 +101,7 @@ pub(super) struct Advised {
     farthest_m: f64,
     /// Missed stretches that the pilot has gone back for.
     tried_m: Vec<[f64; 2]>,
-    /// Number of the next knot to decide.
+    /// Number of the next knot of the trajectory to decide.
     next: i64,
     ended_s: Option<f64>,
     /// Total time that the pilot has kept the vehicle stationary because of advice, s.

@@ -4,7 +4,7 @@ use headrace_geometry::math;
 
 use crate::random::Stream;
 
-/// Offsets along the axis, left and up, m; roll, pitch and yaw, radians.
+/// Offsets of the vehicle: along the axis, left and up, m; roll, pitch and yaw, radians.
 pub type Offsets = [f64; 6];
 
 /// Control points of a spline, `spacing_s` apart. The first point lies one spacing before the start.
@@ -31,8 +31,8 @@ impl Knots {
         }
     }
 
-    /// Offsets `after_s` seconds after the start. Before the first and after the last knot the motion continues
-    /// straight.
+    /// Offsets of the vehicle `after_s` seconds after the start. Before the first and after the last knot the motion
+    /// continues straight.
     pub fn at(&self, after_s: f64) -> Offsets {
         let inside = (self.points.len() as f64 - 3.0) * self.spacing_s;
         let within_s = after_s.clamp(0.0, inside.max(0.0));

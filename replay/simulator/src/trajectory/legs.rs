@@ -11,9 +11,9 @@ const SHORTEST_M: f64 = 1e-6;
 /// A leg at constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
-    /// Distance, m, positive.
+    /// Length of the leg, m, positive.
     pub distance_m: f64,
-    /// Speed over ground, m/s; negative if backwards.
+    /// Speed on the leg over ground, m/s; negative if backwards.
     pub speed_mps: f64,
 }
 
@@ -23,7 +23,7 @@ impl Leg {
     }
 }
 
-/// Legs in sequence, level and parallel to the axis, at one position in the cross-section.
+/// Trajectory of legs in sequence, level and parallel to the axis, at one position in the cross-section.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Legs {
     across_m: [f64; 2],

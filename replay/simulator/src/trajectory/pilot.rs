@@ -17,12 +17,12 @@ const MOST_TIMES_AS_LONG: f64 = 50.0;
 /// Parameters of a pilot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pilot {
-    /// Chainage of the start and the end, m.
+    /// Chainages of the dive's start and end, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
     /// Position in the cross-section about which the vehicle drifts: y, z, m.
     pub(super) across_m: [f64; 2],
-    /// Speed while moving, m/s.
+    /// Speed while the vehicle moves, m/s.
     pub(super) speed_mps: f64,
     /// Number of stops per hour and of reversals per hour.
     pub(super) stops_per_hour: f64,
@@ -54,7 +54,7 @@ enum Doing {
 }
 
 impl Pilot {
-    /// The chainage at each step, and one step before the first.
+    /// The vehicle's chainage at each time step, and one step before the first.
     ///
     /// Errors, as text: the trajectory never ends.
     fn chainages_m(&self, stick: Stream, flow: &Flow) -> Result<Vec<f64>, String> {

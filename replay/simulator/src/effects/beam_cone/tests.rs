@@ -74,7 +74,7 @@ fn single_ray_equals_the_base_ray_bit_for_bit() {
 }
 
 #[test]
-fn beam_cone_keeps_the_true_axis_point_and_perpendicular_ranges() {
+fn beam_cone_leaves_the_true_axis_point_and_perpendicular_ranges_unchanged() {
     let dive = Dive::with_head();
     let (base, first, bilinear) = (
         dive.dive(""),
@@ -113,7 +113,7 @@ fn beam_width_follows_frequency() {
 }
 
 #[test]
-fn slice_length_does_not_change_results() {
+fn time_slice_length_does_not_change_results() {
     Dive::with_head().assert_slices_dont_matter("[effects.beam_cone]\nform = \"bilinear\"\nrays = 8");
 }
 

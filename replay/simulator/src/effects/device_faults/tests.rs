@@ -116,7 +116,7 @@ fn babbling_device_sends_as_many_bytes_as_before() {
 }
 
 #[test]
-fn slice_length_does_not_change_results() {
+fn time_slice_length_does_not_change_results() {
     for fault in ["kind = \"stick\"", "kind = \"jump\"\nsize = 1", "kind = \"die\"", "kind = \"babble\""] {
         for sensor in ["head_a", "ping", "depth", "imu", "tether"] {
             same_in_any_slices(&Bench::turning(&keys(sensor, fault)));

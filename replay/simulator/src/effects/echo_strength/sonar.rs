@@ -57,7 +57,7 @@ pub(crate) struct Silt {
 }
 
 impl Sonar {
-    /// Probability that the echo of a wall at `range_m` is detected. `square` is the cosine of incidence.
+    /// Probability that a head detects the echo of a wall at `range_m`. `square` is the cosine of incidence.
     pub(crate) fn detected(&self, range_m: f64, square: f64) -> f64 {
         let echo_db = self.echo_db(range_m.max(0.01), square);
         let noise_db = 10.0 * log10(HEARD_PULSE_S / self.pulse_s);

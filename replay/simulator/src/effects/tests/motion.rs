@@ -54,7 +54,7 @@ fn row(at: u64, values: &[f64]) -> [f64; 9] {
 /// Effects on other sensors change neither the random numbers of an effect on one sensor, nor the measurements of
 /// sensors without effects.
 #[test]
-fn naming_an_effect_changes_nothing_for_other_sensors() {
+fn adding_an_effect_to_one_sensor_changes_nothing_for_others() {
     for (sensor, alone) in ALONE.iter().filter(|(sensor, _)| !sensor.is_empty()) {
         let touching = ALONE.iter().filter(|(touched, _)| !touched.is_empty() && touched != sensor);
         let others: Vec<String> =
@@ -67,7 +67,7 @@ fn naming_an_effect_changes_nothing_for_other_sensors() {
 }
 
 #[test]
-fn all_effects_together_are_independent_of_slice_length() {
+fn all_effects_together_are_independent_of_time_slice_length() {
     let all: String = ALONE.iter().map(|(_, effect)| *effect).collect();
     same_in_any_slices(&Bench::sectors(&all));
 }

@@ -3,9 +3,9 @@
 
 use super::*;
 
-/// Length of a step along a ray, m.
+/// Length of the model's steps along a ray, m.
 const STEP_M: f64 = 2e-3;
-/// Length over which rays are followed, m.
+/// Length over which the model follows rays, m.
 pub(super) const FAR_M: f64 = 20.0;
 
 /// A profile with a closed form for its wall.
@@ -51,7 +51,7 @@ impl Shape {
 
     /// Distance from the reference point to the wall in a direction, and the arc length of that wall point.
     fn wall(self, [dy, dz]: [f64; 2]) -> (f64, f64) {
-        // Angle from straight down, growing to the left.
+        // Angle of a direction from straight down, growing to the left.
         let angle = math::wrap(math::atan2(dy, -dz), math::TAU);
         match self {
             Self::Circle(radius) => (radius, radius * angle),
