@@ -4,7 +4,7 @@
 
 use crate::{Clock, Entry, Format, Step};
 
-/// Length of a SocketCAN `can_frame`.
+/// Length of a SocketCAN `can_frame`, bytes.
 const FRAME_BYTES: usize = 16;
 const EXTENDED: u32 = 1 << 31;
 const REMOTE: u32 = 1 << 30;
@@ -40,7 +40,7 @@ impl Format for Candump {
                 out.extend(entry);
                 Step::Took(used)
             }
-            // A last line without a newline may be truncated anywhere.
+            // At the end of the file, a line without a newline may be truncated anywhere.
             Err(_) if newline.is_none() => Step::More,
             Err(why) => Step::Lost(used, why),
         }
@@ -49,7 +49,7 @@ impl Format for Candump {
 
 const NO_LINE: &str = "no line of candump";
 
-/// Parses a line. Returns `None` for a frame that the logging machine sent itself.
+/// Parses a line of the file. Returns `None` for a frame that the logging machine sent itself.
 fn entry(line: &[u8]) -> Result<Option<Entry>, &'static str> {
     let line = str::from_utf8(line).map_err(|_| NO_LINE)?;
     let mut fields = line.split_ascii_whitespace();

@@ -6,22 +6,22 @@ use headrace_replay::log::LogError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// Reading the file fails.
+    /// Reading the file to import fails.
     #[error("reading {name} at byte {offset}: {source}")]
     Read {
         /// File name.
         name: String,
-        /// Offset in the file, bytes.
+        /// Offset in the file at which reading failed, bytes.
         offset: u64,
         /// Error of the system.
         source: std::io::Error,
     },
-    /// The file has no entry.
+    /// The file to import contains no entry.
     #[error("importing {name}: there is no {what} in its {bytes} bytes{why}")]
     Nothing {
         /// File name.
         name: String,
-        /// Name of the entries that the file should have.
+        /// Name of the entries that a file of this kind should have.
         what: &'static str,
         /// Length of the file, bytes.
         bytes: u64,

@@ -31,11 +31,11 @@ pub enum FileKind {
 }
 
 impl FileKind {
-    /// All kinds, in the order of their listing.
+    /// All kinds of foreign logs, in the order in which help lists them.
     pub const ALL: [Self; 7] =
         [Self::Tlog, Self::Candump, Self::Imagenex, Self::Ping, Self::Csv, Self::Rosbag, Self::Mcap];
 
-    /// Recognises a kind by the extension of a file name, in upper or lower case.
+    /// Recognises a kind of file by the extension of its name, in upper or lower case.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
         match extension.as_str() {
@@ -133,7 +133,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the form of a line's name, for messages.
+    /// Returns the form of a line's name in files of this kind, for messages.
     pub(crate) fn line_form(self) -> &'static str {
         match self {
             Self::Tlog => tlog::STREAM,

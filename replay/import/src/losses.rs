@@ -12,7 +12,7 @@ pub(super) struct Losses {
     last: Option<(u64, &'static str)>,
     cut_off: Option<(u64, usize)>,
     late: u64,
-    /// Number of gaps, then length and time of the first gap.
+    /// Number of gaps between timestamps, then length and time of the first gap.
     gaps: Option<(u64, u64, MonoNs)>,
 }
 
@@ -37,7 +37,7 @@ impl Losses {
         self.cut_off = Some((at, bytes));
     }
 
-    /// Counts entries dropped because their timestamps came too late in the file to be put in order.
+    /// Counts entries dropped because they came too late in the file to be put in time order.
     pub(super) fn late(&mut self, count: u64) {
         self.late = count;
     }

@@ -12,11 +12,11 @@ use crate::order::Order;
 use crate::{Clock, Entry, Format, ImportError, ImportReport, Input, Source as _, Step};
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// Upper bound on the length of a header, bytes.
+/// Upper bound on the length of a record's header, bytes.
 const MOST_HEADER: usize = 1 << 16;
 /// Maximum number of bytes read from the definitions at the end of a bag.
 const MOST_INDEX: u64 = 64 << 20;
-/// Timestamps before this one, in 2001, don't count as UTC.
+/// Timestamps earlier than this time in 2001 don't count as UTC.
 pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
 
 const NO_RECORD: &str = "no bag record";
@@ -29,7 +29,7 @@ pub struct Bag {
     /// Whether the reader has lost the position of the next record.
     astray: bool,
     connections: BTreeMap<u32, Topic>,
-    /// The chunk being read.
+    /// The chunk whose records are being read.
     chunk: Option<Chunk>,
     first_ns: Option<u64>,
     /// Counts stated in the bag's header.
@@ -46,36 +46,37 @@ struct Stated {
     chunks: u32,
 }
 
-/// An unpacked chunk, the position reached in it, and the step to return at its end.
+/// An unpacked chunk, the position reached in it, and the parsing result to return at its end.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,
     step: Step,
 }
 
-/// A record: its fields, its data, and its total length.
+/// A record of the bag: its fields, its data, and its total length.
 struct Record<'a> {
     fields: Fields<'a>,
     data: &'a [u8],
     len: usize,
 }
 
-/// Result of accepting a record.
+/// Result of accepting a record of the bag.
 enum Accepted<'a> {
     /// The record has been processed.
     Read,
-    /// The record is a chunk with this compression.
+    /// The record is a chunk with this compression; its content must be unpacked.
     Chunk(&'a [u8]),
 }
 
 /// Reason why a record can't be read.
 enum Stop<'a> {
-    /// The record is incomplete. If its fields are complete, they are given with the available part of its data.
+    /// The record is incomplete. If its header fields are complete, they are given with the available part of its
+    /// data.
     More(Option<(Fields<'a>, &'a [u8])>),
     Bad,
 }
 
-/// Fields of a header.
+/// Fields of a record's header.
 #[derive(Clone, Copy)]
 struct Fields<'a>(&'a [u8]);
 
@@ -300,7 +301,7 @@ impl Bag {
             3 => self.stated = Some(Self::bag_header(fields)?),
             5 => return Some(Accepted::Chunk(fields.get(b"compression")?)),
             7 => self.connection(fields.u32(b"conn")?, fields, Fields(data))?,
-            // Index records hold no messages, and unknown kinds may be ignored.
+            // Records of an index hold no messages, and records of unknown kinds may be ignored.
             _ => (),
         }
         Some(Accepted::Read)
@@ -373,9 +374,9 @@ const MOST_UNPACKED: usize = 64 << 20;
 /// Result of unpacking a chunk.
 #[derive(Debug, PartialEq, Eq)]
 enum Unpacked {
-    /// The whole chunk.
+    /// The whole chunk was unpacked.
     Whole(Vec<u8>),
-    /// The available part of a chunk that is cut off by the end of the file.
+    /// Only the available part was unpacked, because the end of the file cuts off the chunk.
     Cut(Vec<u8>),
     /// The chunk can't be unpacked, for this reason.
     Bad(&'static str),

@@ -34,7 +34,7 @@ pub struct Topic {
     pub known: Result<Type, String>,
 }
 
-/// Sensors that receive the messages of topics.
+/// The sensors that receive messages, by topic.
 #[derive(Default)]
 pub struct Feeds {
     by_topic: BTreeMap<String, Feed>,
@@ -48,7 +48,7 @@ impl Feeds {
         &self.matched
     }
 
-    /// Returns how old values may be when their message is recorded, ns.
+    /// Returns the greatest age that values may have when their message is recorded, ns.
     ///
     /// One message may contain the beams of a head's whole turn.
     pub(super) fn reach_ns(&self) -> u64 {
@@ -69,7 +69,7 @@ impl Feeds {
         let feed = self.by_topic.get_mut(&topic.name);
         match feed.filter(|feed| topic.known.as_ref().is_ok_and(|known| feed.is_of(*known))) {
             Some(feed) => feed.take(encoding, record_ns, bytes, out),
-            // This entry is counted as belonging to no sensor.
+            // A message without a feed becomes an empty entry, which counts as belonging to no sensor.
             None => out.push(Entry { stamp_ns: record_ns, stream: String::new(), bytes: Vec::new() }),
         }
     }

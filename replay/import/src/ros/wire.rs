@@ -6,16 +6,16 @@
 /// Serialisation of a recording's messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
-    /// Serialisation of ROS 1.
+    /// Serialisation of messages in ROS 1.
     Ros1,
-    /// Serialisation of ROS 2: plain CDR, version 1.
+    /// Serialisation of messages in ROS 2: plain CDR, version 1.
     Cdr,
 }
 
 /// Maximum number of padding bytes after a message's last field.
 const MOST_PADDING: usize = 7;
 
-/// A message, and the position up to which it has been read.
+/// A serialised message, and the position up to which it has been read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wire<'a> {
     bytes: &'a [u8],
@@ -42,7 +42,7 @@ macro_rules! numbers {
 }
 
 impl<'a> Wire<'a> {
-    /// Starts at the beginning of a message. Returns `None` if its encapsulation isn't plain CDR.
+    /// Starts at the beginning of a serialised message. Returns `None` if its encapsulation isn't plain CDR.
     pub(super) fn new(message: &'a [u8], encoding: Encoding) -> Option<Self> {
         let (bytes, big_endian) = match (encoding, message) {
             (Encoding::Ros1, bytes) => (bytes, false),
@@ -71,7 +71,8 @@ impl<'a> Wire<'a> {
         Some(all)
     }
 
-    /// Reads the count of a sequence. Returns `None` if its elements, of at least `element_bytes` each, can't fit.
+    /// Reads the number of elements in a sequence. Returns `None` if its elements, of at least `element_bytes` each,
+    /// can't fit.
     pub(super) fn count(&mut self, element_bytes: usize) -> Option<usize> {
         let count = usize::try_from(self.u32()?).ok()?;
         let most = (self.bytes.len() - self.at) / element_bytes.max(1);
