@@ -20,7 +20,7 @@ pub struct AtomicFile {
     beside: Option<(PathBuf, Beside)>,
 }
 
-/// How an incomplete file is stored beside its destination.
+/// Name under which an incomplete file is stored beside its destination.
 #[derive(Debug)]
 enum Beside {
     /// The incomplete file has a temporary name.
@@ -213,7 +213,7 @@ fn path_of(file: &File) -> PathBuf {
     format!("/proc/self/fd/{}", file.as_raw_fd()).into()
 }
 
-/// Returns the folder of a file.
+/// Returns the folder that contains a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -32,10 +32,10 @@ pub enum EffectInfluenceError {
     /// A scene can't be simulated, possibly because an effect was left out.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// A loop can't be armed for the scene's vehicle.
+    /// The monitor's loop can't be set up (armed) for the scene's vehicle.
     #[error("arming the loop that judges the scene: {0}")]
     Loop(#[from] headrace_monitor::PluginError),
-    /// The loop can't process a simulated dive.
+    /// The monitor's loop can't process a simulated dive.
     #[error(transparent)]
     Drive(#[from] DriveError),
     /// There are too few seeds for a confidence interval.
@@ -46,7 +46,7 @@ pub enum EffectInfluenceError {
 /// Cost of some effects of a scene, and change of the results if these effects are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
-    /// Names of the effects left out.
+    /// Names of the effects that are left out of the simulation.
     pub effects: Vec<&'static str>,
     /// Cost of these effects, ns of processor time per sonar return.
     pub price_ns: Mean,
@@ -185,7 +185,7 @@ impl Paired<'_> {
     }
 }
 
-/// Results of one dive.
+/// Coverage results of one dive.
 #[derive(Debug, Clone)]
 struct Figures {
     /// Diameter D of the hole, m, of each section whose hole is bounded. The key is the start of the section, mm.
@@ -284,9 +284,9 @@ fn thread_ns() -> f64 {
 /// A mean and the half-width of its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
-    /// The mean.
+    /// The mean of the values.
     pub mean: f64,
-    /// Half-width of the interval; infinite for a single value.
+    /// Half-width of the confidence interval; infinite for a single value.
     pub half: f64,
 }
 
@@ -299,7 +299,7 @@ const T: [f64; 30] = [
 const T_OF_MANY: f64 = 1.96;
 
 impl Mean {
-    /// Computes the mean of independent values, and its interval.
+    /// Computes the mean of independent values, and its 95 % confidence interval.
     pub fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;

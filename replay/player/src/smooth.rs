@@ -39,9 +39,9 @@ pub enum SmoothError {
     /// The file for the steps can't be created, written or read.
     #[error("keeping the filter's steps in a file of {}, {bytes} bytes so far: {source}", folder.display())]
     File {
-        /// Folder of the file.
+        /// Folder of the temporary file.
         folder: PathBuf,
-        /// Length of the file, bytes.
+        /// Length of the temporary file, bytes.
         bytes: u64,
         /// Error of the system.
         source: std::io::Error,
@@ -49,9 +49,9 @@ pub enum SmoothError {
     /// Steps were lost, because the filter produced them faster than they were stored.
     #[error("keeping the filter's steps: {lost} steps of a tick were lost; a tick may have up to {queued}")]
     Lost {
-        /// Number of lost steps.
+        /// Number of lost filter steps.
         lost: u64,
-        /// Capacity of the queue, steps.
+        /// Capacity of the queue, filter steps.
         queued: usize,
     },
     /// A filter step read back from the file is invalid, so it differs from the one written.
@@ -122,7 +122,7 @@ impl Changes {
     }
 }
 
-/// Filter steps of a replay, stored in a file.
+/// Filter steps of a replay, stored in a temporary file.
 struct Steps {
     journal: JournalReader,
     folder: PathBuf,

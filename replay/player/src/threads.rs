@@ -22,7 +22,7 @@ pub const MOST_THREADS: usize = 3;
 
 /// Number of ticks in a batch. One queue operation then passes some milliseconds of work.
 const BATCH_TICKS: usize = 32;
-/// Maximum number of batches that wait between two threads.
+/// Maximum number of batches of ticks that wait between two threads.
 const MOST_WAITING: usize = 4;
 /// Capacity of the queue of used batches. It fits the batches of two queues, and the batches being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
@@ -30,13 +30,13 @@ const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 /// A tick, with its placed pings and its advice.
 #[derive(Default)]
 struct Tick {
-    /// End of the tick's time.
+    /// Time at the end of the tick.
     now: MonoNs,
     placed: Arc<Placed>,
     advised: Advised,
 }
 
-/// A batch of ticks.
+/// A batch of ticks, which is passed between threads as a whole.
 #[derive(Default)]
 struct Batch {
     ticks: Vec<Tick>,
@@ -45,7 +45,7 @@ struct Batch {
 }
 
 impl Batch {
-    /// Runs the placer for the next tick.
+    /// Runs the placer of pings for the next tick.
     fn place(&mut self, placer: &mut Placer, now: MonoNs) {
         if self.len == self.ticks.len() {
             self.ticks.push(Tick::default());

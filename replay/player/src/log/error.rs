@@ -7,23 +7,23 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// The file could not be created.
+    /// The log file could not be created.
     #[error("could not create {}: {source}", path.display())]
     Create {
-        /// Path of the file.
+        /// Path of the log file.
         path: PathBuf,
         /// Error of the system.
         source: io::Error,
     },
-    /// The file could not be opened.
+    /// The log file could not be opened.
     #[error("could not open {}: {source}", path.display())]
     Open {
-        /// Path of the file.
+        /// Path of the log file.
         path: PathBuf,
         /// Error of the system.
         source: io::Error,
     },
-    /// Reading fails with an I/O error.
+    /// Reading the log fails with an I/O error.
     #[error("could not read {name} at byte {offset}: {source}")]
     Read {
         /// Name of the log, given by the caller.
@@ -52,11 +52,11 @@ pub enum LogError {
     /// The file isn't an MCAP file.
     #[error("{name} is not an MCAP file: it begins with [{found}]; expected [{wanted}]")]
     NotMcap {
-        /// Name of the log, given by the caller.
+        /// Name of the file, given by the caller.
         name: String,
-        /// First bytes of the file, in hex.
+        /// First bytes of the file that isn't MCAP, in hex.
         found: String,
-        /// First bytes of an MCAP file, in hex.
+        /// First bytes that an MCAP file must have, in hex.
         wanted: String,
     },
     /// The log was written by a later version of this program.
@@ -64,15 +64,15 @@ pub enum LogError {
     TooNew {
         /// Name of the log, given by the caller.
         name: String,
-        /// Format version of the log.
+        /// Format version that the log states.
         found: String,
-        /// Latest format version supported here.
+        /// Latest format version that this program can read.
         known: u32,
     },
     /// The folder contains no log.
     #[error("{} holds no log: nothing in it ends in .mcap", folder.display())]
     NoLogs {
-        /// Path of the folder.
+        /// Path of the folder without a log.
         folder: PathBuf,
     },
     /// There are several logs, and one of them isn't part of a recording.
@@ -133,7 +133,7 @@ pub enum LogError {
         /// Error of the system.
         source: io::Error,
     },
-    /// The medium neither accepts data nor fails.
+    /// At the end of a recording, the medium neither accepts data nor fails.
     #[error(
         "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; how much of the log is on it isn't known"
     )]

@@ -19,12 +19,12 @@ impl<'a> Fields<'a> {
         Self { rest: bytes, taken: 0 }
     }
 
-    /// Returns the number of bytes read so far.
+    /// Returns the number of bytes of the record read so far.
     pub(super) fn taken(&self) -> u64 {
         self.taken
     }
 
-    /// Returns the unread bytes.
+    /// Returns the unread bytes of the record.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.rest
     }

@@ -29,7 +29,7 @@ pub(super) const MAX_HELD_BYTES: usize = 32 << 20;
 /// Maximum number of pieces, which are chunks and runs of messages outside chunks. Three days of half-second chunks
 /// fit.
 pub(super) const MAX_PIECES: usize = 1 << 19;
-/// Maximum number of channels.
+/// Maximum number of channels in a log.
 pub(super) const MAX_CHANNELS: usize = 4096;
 /// Maximum number of sources, which are the names after `/raw/` and `/sent/`.
 pub(super) const MAX_SOURCES: usize = 1024;
@@ -37,7 +37,7 @@ pub(super) const MAX_SOURCES: usize = 1024;
 pub(super) const MAX_HEADER_BYTES: u64 = 8 << 20;
 /// Memory of a map entry in addition to its bytes, bytes.
 const ENTRY_COST: u64 = 128;
-/// Maximum total length of all attachments, bytes.
+/// Maximum total length of all attachments of a log, bytes.
 pub(super) const MAX_ATTACHMENT_BYTES: u64 = 16 << 20;
 /// Maximum length of a text from the log that a loss quotes, bytes.
 const MAX_QUOTED_BYTES: usize = 100;

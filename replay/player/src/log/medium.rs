@@ -14,7 +14,7 @@ pub(super) struct Medium<R> {
     at: u64,
     len: u64,
     failed: Vec<Range<u64>>,
-    /// Text of the first error.
+    /// Text of the first error that the medium reported.
     error: String,
 }
 
@@ -37,12 +37,12 @@ impl<R: Read + Seek> Medium<R> {
         self.failed.iter().any(|failed| failed.start < part.end && part.start < failed.end)
     }
 
-    /// Returns the ranges found unreadable so far.
+    /// Returns the byte ranges found unreadable so far.
     pub(super) fn failed(&self) -> &[Range<u64>] {
         &self.failed
     }
 
-    /// Returns the text of the first error.
+    /// Returns the text of the first error that the medium reported.
     pub(super) fn error(&self) -> &str {
         &self.error
     }

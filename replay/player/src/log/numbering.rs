@@ -26,15 +26,15 @@ struct Run {
     last: u64,
 }
 
-/// Message numbers of a channel read so far.
+/// Runs of a channel's message numbers read so far.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Count {
-    /// Expected number of the channel's first message.
+    /// Number that the channel's first message should have.
     first: u64,
     runs: Vec<Run>,
 }
 
-/// Message numbers of all channels read so far.
+/// Runs of message numbers of all channels read so far.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(super) struct Numbering {
     channels: BTreeMap<u16, Count>,
@@ -44,7 +44,7 @@ pub(super) struct Numbering {
     wanted: Option<u64>,
 }
 
-/// Kind of numbering fault.
+/// Kind of fault in the message numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fault {
     Missing,
@@ -84,7 +84,7 @@ impl Numbering {
         Some(Self { channels, messages: 0, wanted })
     }
 
-    /// Adds the messages of a piece, in file order.
+    /// Adds the message numbers of a piece, in file order.
     pub(super) fn add(&mut self, piece: usize, entries: &[Entry]) {
         for head in entries.iter().map(|entry| entry.head) {
             self.messages += 1;
@@ -159,7 +159,7 @@ impl Break {
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
     }
 
-    /// Returns the file offsets between which the break lies.
+    /// Returns the file offsets between which the break in the message numbers lies.
     fn place(&self, spans: &[Span]) -> (u64, u64) {
         let before = self.pieces.0.checked_sub(1).and_then(|piece| spans.get(piece));
         let from = before.map_or(0, |span| span.end);

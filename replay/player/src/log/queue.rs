@@ -82,7 +82,7 @@ pub(super) struct Gap {
     pub(super) packets: u64,
 }
 
-/// Bytes sent to a device.
+/// A message with bytes sent to a device.
 pub(super) struct SentMessage {
     pub(super) source: u16,
     pub(super) at: MonoNs,
@@ -93,7 +93,7 @@ pub(super) struct SentMessage {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Dropped {
     pub(super) source: u16,
-    /// Times between which the packets were dropped.
+    /// Times between which the source's packets were dropped.
     pub(super) span: (MonoNs, MonoNs),
     pub(super) packets: u64,
 }
@@ -148,7 +148,7 @@ pub(super) fn entry_head(
     head
 }
 
-/// The loop's end of the queue.
+/// The end of the queue at which the loop adds entries.
 pub(super) struct Entries<R: ByteProducer = Prod<Arc<HeapRb<u8>>>> {
     pub(super) ring: R,
 }
@@ -195,10 +195,10 @@ pub(super) fn until_stopped(
     }
 }
 
-/// The thread's end of the queue.
+/// The end of the queue at which the recorder's thread takes entries.
 pub(super) struct Queue<R: ByteConsumer = Cons<Arc<HeapRb<u8>>>> {
     pub(super) ring: R,
-    /// Message of the entry that was taken last.
+    /// Message of the queue entry that was taken last.
     pub(super) message: Vec<u8>,
 }
 

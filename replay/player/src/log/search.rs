@@ -1,4 +1,4 @@
-//! Searches byte by byte for records after damage.
+//! Searches a damaged file byte by byte for the next intact records.
 
 use std::io::{Read, Seek};
 

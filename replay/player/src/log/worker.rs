@@ -20,17 +20,17 @@ use super::writer::{Lane, LogHeader, Summary};
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 /// Minimum interval at which the log records how many packets the connections to devices dropped.
 const DROPPED_PERIOD: Duration = Duration::from_secs(5);
-/// Maximum number of entries written in one step.
+/// Maximum number of queue entries written in one step.
 const BATCH: usize = 256;
 
-/// A derived message.
+/// A message derived from results, such as one for viewers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
     /// Number of the result channel for the message. The message is ignored if the log has no such channel.
     pub channel: u16,
-    /// Log time of the message.
+    /// Log time of the derived message.
     pub at: MonoNs,
-    /// Content of the message.
+    /// Content of the derived message.
     pub bytes: Vec<u8>,
 }
 
@@ -53,7 +53,7 @@ pub struct RecorderWorker {
     space: Space,
     echoes: Echoes,
     beside: Beside,
-    /// Number of packets in skipped ticks.
+    /// Number of packets in the ticks that were skipped.
     skipped: u64,
     /// Ids of the sources.
     ids: Vec<String>,

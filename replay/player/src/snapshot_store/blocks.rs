@@ -29,7 +29,7 @@ const fn gear() -> [u64; 256] {
     table
 }
 
-/// Returns the blocks in order. Their concatenation is `bytes`.
+/// Cuts bytes into blocks, in order. The blocks' concatenation is `bytes`.
 pub(super) fn blocks(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = bytes;
     core::iter::from_fn(move || {

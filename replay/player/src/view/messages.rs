@@ -43,7 +43,7 @@ pub(super) struct Turn {
 }
 
 impl Turn {
-    /// The identity, for frames that coincide.
+    /// The identity rotation, for frames whose axes coincide.
     pub(super) const NONE: Self = Self { x: 0.0, y: 0.0, z: 0.0, w: 1.0 };
 
     /// Creates a quaternion, rounded to a microradian.

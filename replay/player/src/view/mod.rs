@@ -184,7 +184,7 @@ impl View {
         Some(())
     }
 
-    /// Publishes the messages that are due at regular intervals.
+    /// Publishes the messages for viewers that are due at regular intervals.
     fn beat(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
         self.at = at;
         made.push_some(Topic::Points, self.points.close_before(at).as_ref());
@@ -286,7 +286,7 @@ impl DerivedChannels for View {
         let mut rest = words.as_slice();
         while let Some((record, after)) = first_record(rest) {
             rest = after;
-            // Records in the format of another version are skipped.
+            // Records of results in the format of another version are skipped.
             let _ = self.record(record, &mut made);
         }
         self.at = at;
@@ -306,7 +306,7 @@ impl DerivedChannels for View {
     }
 }
 
-/// Collects messages for the log.
+/// Collects messages for viewers, to be written to the log.
 struct Outbox<'a> {
     /// Log time of the messages. It is that of the results they come from, so that log times don't go back.
     at: MonoNs,

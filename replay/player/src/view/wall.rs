@@ -9,13 +9,13 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use super::messages::{Field, Grid, Pose, Turn, Xy, Xyz, base64, rounded};
 use super::site::{Site, WALL};
 
-/// Approximate size of a cell along the perimeter, m.
+/// Approximate size of a grid cell along the tunnel's perimeter, m.
 const CELL_M: f64 = 0.25;
 /// Length of wall displayed ahead of the vehicle, and behind it, m.
 const REACH_M: f64 = 8.0;
 /// Length of wall kept beyond either end of the tunnel, m, because heads may be there.
 const BEYOND_M: f64 = 25.0;
-/// Minimum interval between grids.
+/// Minimum interval between two published grids of the wall.
 const EVERY: DurNs = DurNs(2_000_000_000);
 const FIELDS: [Field; 6] = [
     Field::byte("red", 0),
@@ -62,7 +62,7 @@ impl Wall {
         }
     }
 
-    /// Counts a sample in its cell.
+    /// Counts a sample in its grid cell of the wall.
     pub(super) fn sample(&mut self, x_m: f64, arc_m: f64) {
         let row = usize::try_from(math::floor_to_i64(arc_m / self.cell_m)).unwrap_or(0).min(self.cells - 1);
         let column = self.column(math::floor_to_i64(x_m / self.section_m));

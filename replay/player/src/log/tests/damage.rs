@@ -35,7 +35,7 @@ fn log() -> (Vec<u8>, Vec<Seen>, Vec<usize>) {
     (bytes, seen, places[1..].to_vec())
 }
 
-/// Returns the messages of all chunks except one.
+/// Returns the messages of all chunks except the given one.
 fn without_chunk(seen: &[Seen], chunk: usize) -> Vec<Seen> {
     [&seen[..chunk * PER_CHUNK], &seen[(chunk + 1) * PER_CHUNK..]].concat()
 }
@@ -65,7 +65,7 @@ fn log_cut_anywhere_delivers_messages_before_the_cut() {
     }
 }
 
-/// A medium with unreadable bytes.
+/// A medium that can't read some of its bytes.
 struct Worn<'a> {
     bytes: std::io::Cursor<&'a [u8]>,
     bad: core::ops::Range<usize>,
@@ -74,7 +74,7 @@ struct Worn<'a> {
 impl std::io::Read for Worn<'_> {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         let at = usize::try_from(self.bytes.position()).unwrap();
-        // A read stops before the unreadable bytes.
+        // A read that reaches unreadable bytes returns only the bytes before them.
         let len = if at < self.bad.start { into.len().min(self.bad.start - at) } else { into.len() };
         if self.bad.contains(&at) {
             return Err(std::io::Error::from_raw_os_error(5));
@@ -131,7 +131,7 @@ fn unreadable_bytes_are_a_loss_and_the_rest_is_read() {
                 .iter()
                 .any(|loss| matches!(&loss.kind, LossKind::Unreadable(why) if why.contains("os error 5")));
             told += usize::from(is_told);
-            // All messages outside the unreadable sector are read.
+            // All messages of chunks outside the unreadable sector are read.
             let hit = chunks
                 .iter()
                 .filter(|place| **place < sector.end && sector.start < record_after(&bytes, **place))

@@ -61,7 +61,7 @@ fn check(bytes: &[u8], what: &str) -> Vec<Loss> {
     reader.losses().to_vec()
 }
 
-/// Returns all combinations of write options, with names.
+/// Returns all combinations of the MCAP writer's options, with names.
 fn all_options() -> Vec<(String, WriteOptions)> {
     let mut all = Vec::new();
     for (name, compression) in

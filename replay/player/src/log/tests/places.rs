@@ -56,7 +56,7 @@ fn damaged(mut bytes: Vec<u8>, changes: &[(bool, prop::sample::Index, u8)]) -> V
 
 type Reader = LogReader<Cursor<Vec<u8>>>;
 
-/// Reads `count` messages, or all that are left.
+/// Reads the next `count` messages, or all that are left.
 fn take(reader: &mut Reader, count: usize) -> Vec<(u64, Vec<u8>)> {
     let mut seen = Vec::new();
     while seen.len() < count
@@ -110,7 +110,7 @@ fn loss_times_of_damaged_chunks_are_unchanged_after_resuming_earlier() {
         let chunks = places(&whole, op::CHUNK);
         let mut bytes = whole;
         for chunk in &chunks[changed..changed + 2] {
-            // Damages the checksum of the chunk.
+            // Damages the checksum in the chunk's header.
             bytes[chunk + 9 + 24] ^= 1;
         }
         bytes[chunks[changed] + 9] ^= 2;

@@ -28,7 +28,7 @@ impl Write for SlowMedium {
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        // The receiver may have been dropped.
+        // The test may have dropped the receiver already.
         self.done.try_send(self.bytes.clone()).ok();
         Ok(())
     }
@@ -171,7 +171,7 @@ fn dropped_recorder_handle_completes_the_file() {
     assert_eq!((seen.len(), losses), (1, vec![]));
 }
 
-/// A medium with limited space.
+/// A medium that accepts only a limited number of bytes.
 struct SmallMedium(Arc<AtomicUsize>);
 
 impl Write for SmallMedium {
