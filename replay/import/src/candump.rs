@@ -12,7 +12,7 @@ const STANDARD_IDS: u32 = 0x7FF;
 const EXTENDED_IDS: u32 = 0x1FFF_FFFF;
 const LONGEST_LINE: usize = 512;
 
-/// The candump format. Its streams are the CAN interfaces.
+/// The candump format, whose streams are the CAN interfaces.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Candump;
 
@@ -88,7 +88,7 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let id = match id_text.len() {
         3 if number <= STANDARD_IDS => number,
         8 if number <= EXTENDED_IDS => number | EXTENDED,
-        // Error frames of the CAN controller keep their flag.
+        // Error frames of the CAN controller keep the flag in their identifier.
         8 if number >> 29 == 1 => number,
         _ => return Err(NO_LINE),
     };

@@ -13,7 +13,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::{Clock, Entry, Format, Step};
 
-/// Maximum number of values per sensor.
+/// Maximum number of values that a sensor's reading has.
 const SLOTS: usize = 9;
 const LONGEST_LINE: usize = 1 << 16;
 
@@ -77,7 +77,7 @@ impl Csv {
     pub fn new(mapping: &Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
-        // Spreadsheets begin a file with a byte order mark.
+        // Spreadsheets may begin a file with a byte order mark.
         let header = header.trim_start_matches('\u{feff}');
         let names: Vec<&str> = header.trim().split(separator).map(cell).collect();
         let units = [("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1)];

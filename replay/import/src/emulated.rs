@@ -18,16 +18,16 @@ const PERIOD: DurNs = DurNs(10_000_000);
 pub(super) enum Value {
     /// A beam of a head: its angle, and its range if there was an echo.
     Beam(f64, Option<f64>),
-    /// Range of an echosounder; `None` without an echo.
+    /// Range of an echosounder, m; `None` without an echo.
     Range(Option<f64>),
     /// Absolute pressure at a depth sensor, Pa.
     Pressure(f64),
     /// Attitude, turn rate, rad/s, and specific force, m/s^2, of an inertial unit. Parts that were not measured are
     /// NaN.
     Inertia(Rot<Level, Sensor>, [f64; 3], [f64; 3]),
-    /// Velocity over ground, m/s.
+    /// Velocity over ground from a velocity log, m/s.
     Velocity([f64; 3]),
-    /// Chainage by paid-out cable length, m.
+    /// Chainage from a cable counter, by paid-out cable length, m.
     Payout(f64),
 }
 
@@ -37,7 +37,7 @@ impl Value {
     /// Larger values must be refused, because wire formats would wrap or clamp them into plausible ones.
     fn is_possible(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
-        // NaN means "not measured", which is allowed.
+        // A NaN means "not measured", which is allowed.
         let known =
             |values: &[f64; 3], most: f64| values.iter().all(|value| value.is_nan() || value.abs() <= most);
         match self {

@@ -11,7 +11,7 @@ pub struct Entry {
     pub bytes: Vec<u8>,
 }
 
-/// Result of parsing the next bytes of a file.
+/// Result of parsing the next bytes of a file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
     /// This many bytes were parsed. They may hold no entry.
@@ -29,7 +29,7 @@ pub enum Step {
 pub struct ImportReport {
     /// Losses of data.
     pub losses: Vec<String>,
-    /// Remarks that aren't losses.
+    /// Remarks that don't concern losses of data.
     pub remarks: Vec<String>,
 }
 

@@ -22,7 +22,7 @@ pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 /// several recordings.
 const LONGEST_GAP: DurNs = DurNs(3_600_000_000_000);
 
-/// A file being imported.
+/// A foreign log that is being imported.
 pub struct Import<S> {
     pub(crate) input: S,
     pub(crate) order: Order,
@@ -31,10 +31,10 @@ pub struct Import<S> {
     clock: Clock,
 }
 
-/// Result of an import.
+/// Result of importing a foreign log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Imported {
-    /// Number of entries in the file.
+    /// Number of entries in the foreign log.
     pub entries: u64,
     /// Number of entries that belong to no sensor, because of their line or content.
     pub passed_over: u64,

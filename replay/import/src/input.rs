@@ -13,7 +13,7 @@ pub(crate) const READ_BYTES: usize = 1 << 16;
 
 /// A source of entries: a file split by a [`Format`], or a file with a reader of its own.
 pub trait Source {
-    /// Returns the file name.
+    /// Returns the name of the file.
     fn name(&self) -> &str;
 
     /// Adds the next entries to `order`. Returns `false` at the end of the file.
@@ -42,7 +42,7 @@ pub struct Input<R, F = Box<dyn Format>> {
     pub(crate) held: Vec<u8>,
     /// Number of bytes at the start of the buffer that are already consumed.
     done: usize,
-    /// Offset in the file of the buffer's first byte.
+    /// Offset of the buffer's first byte in the file.
     offset: u64,
     end: bool,
     found: Vec<Entry>,

@@ -14,13 +14,13 @@ use crate::tlog::{self, TlogFormat};
 /// A kind of foreign log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
-    /// Telemetry log of MAVLink.
+    /// Telemetry log of the MAVLink protocol.
     Tlog,
-    /// Text of `candump -l` or `-L`.
+    /// Text log of `candump -l` or `candump -L`.
     Candump,
     /// File of Imagenex's software for the heads 881 and 852.
     Imagenex,
-    /// Log of Ping Viewer.
+    /// Log of the program Ping Viewer.
     Ping,
     /// Table of values, with a mapping that describes its columns.
     Csv,
@@ -50,7 +50,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the name of the kind.
+    /// Returns the name of this kind of file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Tlog => "tlog",
@@ -63,7 +63,7 @@ impl FileKind {
         }
     }
 
-    /// Finds a kind by its name.
+    /// Finds a kind of file by its name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }

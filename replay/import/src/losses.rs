@@ -32,7 +32,7 @@ impl Losses {
         self.last = Some((at + bytes as u64, why));
     }
 
-    /// Notes that the file ends within an entry.
+    /// Notes that the foreign log ends within an entry.
     pub(super) fn cut_off(&mut self, at: u64, bytes: usize) {
         self.cut_off = Some((at, bytes));
     }
@@ -48,7 +48,7 @@ impl Losses {
         self.gaps = Some((count + 1, first_ns, first_at));
     }
 
-    /// Returns all losses as text.
+    /// Returns all losses of the import as text.
     pub(super) fn words(&self) -> Vec<String> {
         let mut all: Vec<String> = self
             .kinds

@@ -1,4 +1,4 @@
-//! Puts entries in time order, with bounded memory.
+//! Puts entries of a foreign log in time order, with bounded memory.
 
 use std::collections::BTreeMap;
 

@@ -9,7 +9,7 @@ use crate::{Clock, Entry, Format, Step};
 #[derive(Debug, Default)]
 pub struct PingFormat {
     begun: bool,
-    /// Number of midnights passed since the first message.
+    /// Number of midnights passed since the log's first message.
     days: u64,
     last_of_day_ns: u64,
 }

@@ -10,7 +10,7 @@ use crate::kind::FileKind;
 
 /// A sensor that receives data of the file.
 pub struct Taker {
-    /// Source number of the sensor in the log.
+    /// Number of the sensor's source in the log.
     pub source: u16,
     /// Name of the line in the foreign log whose data the sensor receives.
     pub stream: String,
@@ -95,7 +95,7 @@ pub enum RoutingError {
         /// Form of a line's name in such a file.
         line: &'static str,
     },
-    /// An option names lines, but the file contains values.
+    /// An option names lines, but the file contains values instead of lines.
     #[error("--source isn't for {format}; a mapping file names the sensors")]
     NoLines {
         /// Kind of the file that contains values.
@@ -104,17 +104,17 @@ pub enum RoutingError {
     /// An option names a line that such a file doesn't have.
     #[error("--source {id}={line}: such a file has one line, {only}")]
     NoSuchLine {
-        /// Sensor named by the option.
+        /// Name of the sensor in the option.
         id: String,
-        /// Line named by the option.
+        /// Name of the line in the option.
         line: String,
         /// The only line that such a file has.
         only: &'static str,
     },
-    /// Two options name the same sensor.
+    /// Two options name the same sensor, which can listen to only one line.
     #[error("--source {id}: named twice; a sensor listens to one line")]
     Twice {
-        /// Name of the sensor.
+        /// Name of the sensor in both options.
         id: String,
     },
 }

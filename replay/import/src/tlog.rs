@@ -1,4 +1,4 @@
-//! Telemetry logs of MAVLink.
+//! Telemetry logs of the MAVLink protocol.
 
 use crate::{Clock, Entry, Format, Step};
 use headrace_mavlink::frame::Frames;

@@ -1,15 +1,15 @@
-//! Errors that prevent a simulation.
+//! Errors that prevent the simulation of a scene.
 
 use headrace_config::ConfigErrors;
 
-/// An error in a scene.
+/// Reason why a scene can't be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// An error in keys of the scene or of its vehicle file.
     #[error(transparent)]
     Config(#[from] ConfigErrors),
-    /// An obstacle lies on the trajectory.
+    /// An obstacle lies on the vehicle's trajectory.
     #[error(
         "simulating the trajectory: after {after_s:.1} s, at chainage {chainage_m:.2} m, y {y_m:.2} m, z {z_m:.2} m, it leads \
          through {what}"
@@ -26,7 +26,7 @@ pub enum SceneError {
         /// Name of the obstacle.
         what: String,
     },
-    /// An effect is inconsistent with the scene.
+    /// An effect is inconsistent with the rest of the scene.
     #[error("simulating {effect}: it {problem}")]
     Effect {
         /// Name of the effect.

@@ -7,7 +7,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::trajectory::Ground;
 
-/// Facts that effects are checked against.
+/// Facts about vehicle and tunnel that effects are checked against.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
     /// The sensors, in the order of the vehicle file.
@@ -20,11 +20,11 @@ pub struct Facts {
     pub length_m: f64,
     /// Speed of sound in the vehicle file, m/s.
     pub sound_speed_mps: f64,
-    /// Duration of the trajectory before effects change it, s.
+    /// Duration of the vehicle's trajectory before effects change it, s.
     pub duration_s: f64,
 }
 
-/// A sensor of the vehicle.
+/// Facts about a sensor of the vehicle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorFacts {
     /// Id of the sensor.

@@ -1,4 +1,4 @@
-//! Ideal inertial measurements from the true pose.
+//! Ideal inertial measurements, computed from the true pose.
 
 use headrace_geometry::frames::{Mount, Point3, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
@@ -28,7 +28,7 @@ pub(crate) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) 
     Inertia { at, period, attitude: now, rate_radps, force_mps2 }
 }
 
-/// Half the averaging time of a velocity log.
+/// Half the time over which a velocity log averages.
 const HALF_PING: DurNs = DurNs::from_millis(5);
 
 /// Velocity of the sensor's mounting point at time `at`, m/s.

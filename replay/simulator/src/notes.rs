@@ -85,17 +85,17 @@ impl Figures for Inertia {
 /// One change of a measurement by an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Note {
-    /// Number of the sensor.
+    /// Number of the sensor whose measurement was changed.
     pub source: u16,
     /// Number of the measurement within the current time slice.
     pub sample: usize,
-    /// Index of the effect in the scene.
+    /// Index of the effect in the scene's list of effects.
     pub effect: u16,
     /// Name of the changed value.
     pub what: &'static str,
-    /// Value before the change; NaN if there was none.
+    /// The value before the change; NaN if there was none.
     pub from: f64,
-    /// Value after the change.
+    /// The value after the change.
     pub to: f64,
 }
 

@@ -5,12 +5,12 @@ use headrace_sensor::device::Direction;
 
 use crate::sensing::Line;
 
-/// Bytes on the line of one source.
+/// Bytes of one message on the line of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Message<'a> {
     /// Time at which the bytes crossed the line.
     pub at: MonoNs,
-    /// Number of the source in the vehicle file.
+    /// Number of the message's source in the vehicle file.
     pub source: u16,
     /// Direction of the bytes: to or from the device.
     pub direction: Direction,
@@ -35,7 +35,7 @@ pub(crate) struct Outbox {
     front: Option<usize>,
 }
 
-/// Messages waiting on one line.
+/// Messages that wait on one line.
 #[derive(Debug, Default)]
 struct Lane {
     /// Messages of the line in order of time.
@@ -55,7 +55,7 @@ impl Lane {
         self.line.put_first(line, self.next);
         self.next = 0;
         line.clear();
-        // Drops messages without bytes.
+        // Drops messages that have lost all their bytes.
         self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
         // A reply may cross the line after the next request does, so the messages need sorting.
         if !self.line.messages.is_sorted_by_key(|message| message.at) {
@@ -65,7 +65,7 @@ impl Lane {
 }
 
 impl Outbox {
-    /// Creates an outbox for this many sources.
+    /// Creates an outbox for the messages of this many sources.
     pub(crate) fn new(sources: usize) -> Self {
         let lanes = (0..sources).map(|_| Lane::default()).collect();
         Self { lanes, due: vec![NEVER; sources], ..Self::default() }
@@ -157,7 +157,7 @@ mod tests {
         line
     }
 
-    /// Time, source and byte of each released message.
+    /// Time, source and only byte of each released message.
     fn going(outbox: &mut Outbox) -> Vec<(u64, u16, u8)> {
         let mut gone = Vec::new();
         while outbox.has_next() {

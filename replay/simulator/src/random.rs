@@ -12,13 +12,13 @@ const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: usize = 10;
 
-/// Random numbers of one effect for one source.
+/// Stream of random numbers of one effect for one source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stream {
     key: [u32; 2],
 }
 
-/// A block of two random numbers for one step.
+/// A block of two random numbers for one step of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Draw {
     words: [u32; 4],

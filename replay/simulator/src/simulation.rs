@@ -154,7 +154,7 @@ impl Simulation {
         self.scenery().map_or(0.0, |scenery| scenery.trajectory.duration_s())
     }
 
-    /// True pose of the vehicle.
+    /// True pose of the vehicle at time `at`.
     pub fn pose(&self, at: MonoNs) -> Option<Pose> {
         self.world.get_resource::<Scenery>().map(|scenery| scenery.pose(at))
     }
@@ -169,7 +169,7 @@ impl Simulation {
         &self.added
     }
 
-    /// The base systems, without those that effects replace.
+    /// The base systems of the simulation, without those that effects replace.
     pub fn base_systems(&self) -> &[(Stage, String)] {
         &self.base
     }
@@ -186,7 +186,7 @@ impl Simulation {
         Some(message)
     }
 
-    /// Returns the next message without removing it.
+    /// Returns the next message on any line, without removing it.
     pub fn peek_message(&mut self) -> Option<Message<'_>> {
         self.come().then(|| self.outbox.peek()).flatten()
     }

@@ -1,4 +1,4 @@
-//! Stretches of the tunnel.
+//! Stretches of the tunnel, given by chainage.
 
 use headrace_config::{ConfigError, Section};
 
@@ -12,7 +12,7 @@ pub(crate) struct Stretch {
 }
 
 impl Stretch {
-    /// The whole tunnel.
+    /// The stretch that covers the whole tunnel.
     pub(crate) const ALL: Self = Self { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY };
 
     /// Reads `from_m` and `to_m`. Without one of the keys, the stretch has no limit on that side.
@@ -34,7 +34,7 @@ impl Stretch {
         (self.from_m..self.to_m).contains(&chainage_m)
     }
 
-    /// Whether the stretch shares a chainage with another.
+    /// Whether the stretch overlaps another.
     pub(crate) fn meets(&self, other: &Self) -> bool {
         self.from_m < other.to_m && other.from_m < self.to_m
     }

@@ -16,7 +16,7 @@ pub(crate) struct Dive {
     pub(crate) tunnel: &'static str,
     /// Id, plugin and further keys of each sensor.
     pub(crate) sensors: Vec<(&'static str, &'static str, String)>,
-    /// More tables of the vehicle file.
+    /// Further tables of the vehicle file, as text.
     pub(crate) vehicle: &'static str,
     /// Keys of the scene's table `[trajectory]`.
     pub(crate) trajectory: &'static str,
@@ -27,7 +27,7 @@ pub(crate) struct Dive {
     pub(crate) slice: Option<DurNs>,
 }
 
-/// A message with its bytes.
+/// A message on a line, with its own copy of the bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Said {
     pub(crate) at: MonoNs,
@@ -93,7 +93,7 @@ impl Dive {
         Scene::parse(Document::new("scene.toml", &scene), &KINDS, &|_| Ok(vehicle.clone().into_bytes()), None)
     }
 
-    /// Creates the simulation with these effects.
+    /// Creates the simulation of the dive with these effects.
     pub(crate) fn simulation(&self, effects: &str) -> Result<Simulation, SceneError> {
         let scene = self.scene(effects)?;
         let simulation = Simulation::with_truth(&scene)?;
@@ -103,7 +103,7 @@ impl Dive {
         })
     }
 
-    /// Runs the dive with these effects.
+    /// Simulates the whole dive with these effects.
     pub(crate) fn dive(&self, effects: &str) -> Dived {
         let mut simulation = self.simulation(effects).unwrap_or_else(|why| panic!("{why}"));
         let mut messages = Vec::new();
@@ -116,7 +116,7 @@ impl Dive {
         Dived { rows, messages }
     }
 
-    /// Text of the error for a refused scene.
+    /// Text of the error if the scene with these effects is refused.
     pub(crate) fn refusal(&self, effects: &str) -> String {
         match self.simulation(effects) {
             Ok(_) => panic!("{effects} was taken"),
@@ -141,7 +141,7 @@ impl Dive {
 }
 
 impl Dived {
-    /// Angle and range of each sounding of a source.
+    /// Angle and range of each ping of a sonar.
     pub(crate) fn soundings(&self, source: u16) -> Vec<(f64, Option<f64>)> {
         let rows = self.rows.iter().filter(|row| row.source == source);
         let measured = rows.filter_map(|row| row.sounding).map(|sounding| sounding.measured);

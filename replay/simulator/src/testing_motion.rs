@@ -67,7 +67,7 @@ pub(crate) const LONG: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 
 /// A trajectory of a pilot who goes to chainage 40 m.
 pub(crate) const PILOT: &str = "kind = \"pilot\"\nto_m = 40\nspeed_mps = 0.4\nstops_per_hour = 60\n\
                                 backs_per_hour = 60\nback_m = [0.5, 2]\nstop_s = [5, 10]\n";
-/// A trajectory given over ground.
+/// A trajectory through waypoints, given over ground.
 pub(crate) const WAYPOINTS: &str = "kind = \"waypoints\"\n[[trajectory.waypoints]]\nchainage_m = 2\n\
                                     [[trajectory.waypoints]]\nchainage_m = 6\nspeed_mps = 0.2\n";
 
@@ -78,7 +78,7 @@ pub(crate) type OnLine = (MonoNs, Direction, Vec<u8>);
 pub(crate) struct Bench {
     layout: &'static str,
     scene: String,
-    /// Name of the inertial unit.
+    /// Name of the vehicle's inertial unit.
     unit: &'static str,
 }
 
@@ -131,7 +131,7 @@ impl Bench {
         simulated.err().map(|why| why.to_string()).unwrap_or_default()
     }
 
-    /// The number of a sensor.
+    /// Number of the sensor with this id.
     pub(crate) fn source(&self, sensor: &str) -> usize {
         self.parse().unwrap().facts.sensors.iter().position(|s| s.id == sensor).unwrap()
     }
@@ -146,7 +146,7 @@ impl Bench {
         Simulation::new(&scene).unwrap().measurements_of(self.source(sensor))
     }
 
-    /// All messages on the lines.
+    /// All messages on the lines of a dive.
     pub(crate) fn messages(&self) -> Vec<(MonoNs, u16, Direction, Vec<u8>)> {
         self.messages_in(DurNs(1_000_000_000))
     }
@@ -160,7 +160,7 @@ impl Bench {
         all
     }
 
-    /// Messages on one line.
+    /// Messages on the line of one sensor.
     pub(crate) fn line(&self, source: u16) -> Vec<OnLine> {
         let all = self.messages().into_iter().filter(|message| message.1 == source);
         all.map(|(at, _, direction, bytes)| (at, direction, bytes)).collect()

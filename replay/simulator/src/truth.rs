@@ -59,16 +59,16 @@ impl SoundingTruth {
     }
 }
 
-/// A change made by an effect.
+/// A change of a measurement by an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cause {
-    /// Index of the effect in the scene.
+    /// Index of the effect in the scene's list of effects.
     pub effect: u16,
-    /// Name of the changed figure, with its unit.
+    /// Name of the changed value, with its unit.
     pub what: &'static str,
-    /// Value before the change; NaN if there was none.
+    /// The value before the change; NaN if there was none.
     pub from: f64,
-    /// Value after the change.
+    /// The value after the change.
     pub to: f64,
 }
 

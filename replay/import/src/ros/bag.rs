@@ -32,13 +32,13 @@ pub struct Bag {
     /// The chunk whose records are being read.
     chunk: Option<Chunk>,
     first_ns: Option<u64>,
-    /// Counts stated in the bag's header.
+    /// Position of the index, and counts, as stated in the bag's header.
     stated: Option<Stated>,
     chunks: u64,
     lost: BTreeMap<&'static str, u64>,
 }
 
-/// Index position and counts stated in the bag's header.
+/// Position of the index, and counts, as stated in the bag's header.
 #[derive(Debug, Clone, Copy)]
 struct Stated {
     index_at: u64,
@@ -62,13 +62,13 @@ struct Record<'a> {
 
 /// Result of accepting a record of the bag.
 enum Accepted<'a> {
-    /// The record has been processed.
+    /// The record has been processed completely.
     Read,
     /// The record is a chunk with this compression; its content must be unpacked.
     Chunk(&'a [u8]),
 }
 
-/// Reason why a record can't be read.
+/// Reason why a record of the bag can't be read.
 enum Stop<'a> {
     /// The record is incomplete. If its header fields are complete, they are given with the available part of its
     /// data.
@@ -113,7 +113,7 @@ impl<'a> Fields<'a> {
         Some(u64::from_le_bytes(self.get(name)?.try_into().ok()?))
     }
 
-    /// Reads a time: seconds, then nanoseconds.
+    /// Reads a time field: seconds, then nanoseconds.
     fn time_ns(&self, name: &[u8]) -> Option<u64> {
         let (seconds, nanoseconds) = self.get(name)?.split_at_checked(4)?;
         let number = |bytes: &[u8]| Some(u64::from(u32::from_le_bytes(bytes.try_into().ok()?)));
@@ -125,7 +125,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Splits length-prefixed bytes from the rest.
+/// Splits bytes with a length prefix from the rest.
 fn sized(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (len, rest) = bytes.split_first_chunk()?;
     rest.split_at_checked(usize::try_from(u32::from_le_bytes(*len)).ok()?)
@@ -344,7 +344,7 @@ impl Bag {
         Step::Held
     }
 
-    /// Processes the next record of a chunk.
+    /// Processes the next record within a chunk.
     fn read_on(&mut self, mut chunk: Chunk, out: &mut Vec<Entry>) -> Step {
         let rest = chunk.bytes.get(chunk.at..).unwrap_or_default();
         match record(rest) {
@@ -371,7 +371,7 @@ impl Bag {
 /// Maximum unpacked size of a chunk, bytes. Recorders make chunks of less than a megabyte plus one message.
 const MOST_UNPACKED: usize = 64 << 20;
 
-/// Result of unpacking a chunk.
+/// Result of unpacking a chunk of the bag.
 #[derive(Debug, PartialEq, Eq)]
 enum Unpacked {
     /// The whole chunk was unpacked.

@@ -21,12 +21,12 @@ pub(super) enum Base {
     Header,
 }
 
-/// Timestamp statistics of one topic.
+/// Statistics of the header timestamps of one topic.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Clocks {
     base: Base,
     messages: u64,
-    /// Number of messages with a zero timestamp.
+    /// Number of messages whose header has a zero timestamp.
     unstamped: u64,
     /// Least and greatest difference of record time minus header timestamp, ns.
     lag_ns: Option<(i64, i64)>,

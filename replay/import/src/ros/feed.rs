@@ -27,7 +27,7 @@ impl Default for Manner {
     }
 }
 
-/// Converter of one topic's messages.
+/// Converter of one topic's messages to a sensor's bytes.
 pub(super) struct Feed {
     of: Type,
     sensor: EmulatedSensor,

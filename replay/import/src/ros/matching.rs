@@ -16,7 +16,7 @@ use crate::emulated::EmulatedSensor;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
-    /// The mapping is invalid.
+    /// The mapping of topics to sensors is invalid.
     #[error(transparent)]
     Mapping(#[from] ConfigError),
     /// More than one assignment of topics to sensors is possible.
@@ -36,7 +36,7 @@ pub enum MatchError {
     None {
         /// The topics of the recording, each with its message type.
         topics: String,
-        /// The sensors, each with its kind of measurement.
+        /// The sensors of the vehicle file, each with its kind of measurement.
         sensors: String,
     },
 }

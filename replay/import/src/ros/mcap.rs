@@ -16,7 +16,7 @@ use headrace_replay::log::{ChannelInfo, LogReader};
 /// Maximum number of messages read at once.
 const AT_A_TIME: usize = 64;
 
-/// A recording in MCAP.
+/// A ROS recording in MCAP.
 pub struct Mcap<R> {
     name: String,
     reader: LogReader<R>,

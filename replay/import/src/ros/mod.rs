@@ -23,12 +23,12 @@ pub use wire::Encoding;
 
 use feed::Feed;
 
-/// A topic of a recording.
+/// A topic of a ROS recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topic {
     /// Name of the topic.
     pub name: String,
-    /// Name of the message type.
+    /// Name of the topic's message type.
     pub type_name: String,
     /// Message type, if it is supported; otherwise the reason why it isn't.
     pub known: Result<Type, String>,
@@ -38,12 +38,12 @@ pub struct Topic {
 #[derive(Default)]
 pub struct Feeds {
     by_topic: BTreeMap<String, Feed>,
-    /// Assignments made without a mapping, as text.
+    /// Assignments of topics to sensors made without a mapping, as text.
     matched: Vec<String>,
 }
 
 impl Feeds {
-    /// Returns the assignments made without a mapping, as text.
+    /// Returns the assignments of topics to sensors made without a mapping, as text.
     pub fn matched(&self) -> &[String] {
         &self.matched
     }

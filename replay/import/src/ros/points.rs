@@ -10,7 +10,7 @@ use headrace_geometry::math;
 
 use super::wire::Wire;
 
-/// Maximum number of beams in a head's turn.
+/// Maximum number of beams in one turn of a head.
 const MOST_BEAMS: usize = 1 << 16;
 /// Maximum time between a beam and its message's timestamp, s.
 const LONGEST_S: f64 = 120.0;
@@ -27,7 +27,7 @@ pub(super) fn heard(range_m: f64, least_m: f64, most_m: f64) -> Option<f64> {
     (range_m.is_finite() && range_m > 0.0 && within).then_some(range_m)
 }
 
-/// A beam of a head.
+/// A beam of a head, as converted from a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Beam {
     /// Angle of the beam, as in [`headrace_sensor::reading::SonarReturn::angle_rad`].
@@ -38,7 +38,7 @@ pub(super) struct Beam {
     pub(super) after_s: f64,
 }
 
-/// Plane in which a beam rotates.
+/// Plane of a message's axes in which the head's beam rotates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Plane {
     /// Plane of y and z, in the head's own axes.
@@ -143,7 +143,7 @@ pub(super) fn points(wire: &mut Wire<'_>) -> Option<Beams> {
     Some(Beams::Points(points))
 }
 
-/// Encoding of a number in a sensor_msgs/PointCloud2.
+/// Encoding of a numerical field in a sensor_msgs/PointCloud2.
 #[derive(Debug, Clone, Copy)]
 enum Number {
     U32,

@@ -3,7 +3,7 @@
 //! Sources: ROS wiki, "Message serialization", for ROS 1: little-endian and packed. OMG DDS-XTypes 1.3, 7.4.3, plain
 //! CDR, for ROS 2: numbers are aligned to their size, counted from the end of four bytes that state the byte order.
 
-/// Serialisation of a recording's messages.
+/// Serialisation of the messages in a ROS recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// Serialisation of messages in ROS 1.
@@ -24,7 +24,7 @@ pub(super) struct Wire<'a> {
     big_endian: bool,
 }
 
-/// The header of a stamped message.
+/// The header of a message with a timestamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header<'a> {
     /// Timestamp, nanoseconds on the sender's clock, which may have any epoch.
@@ -84,7 +84,7 @@ impl<'a> Wire<'a> {
         (0..count).map(|_| self.f32()).collect()
     }
 
-    /// Reads length-prefixed bytes.
+    /// Reads bytes with a length prefix.
     pub(super) fn bytes(&mut self) -> Option<&'a [u8]> {
         let count = self.count(1)?;
         self.take(count)

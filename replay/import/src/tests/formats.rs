@@ -1,4 +1,4 @@
-//! Tests of the formats with constructed and arbitrary bytes.
+//! Tests of the file formats with constructed and arbitrary bytes.
 
 use headrace_config::Document;
 use headrace_devices::KINDS;

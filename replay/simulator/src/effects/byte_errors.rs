@@ -45,7 +45,7 @@ struct ByteErrors {
     flipped: Hits,
     dropped: Hits,
     inserted: Hits,
-    /// Number of bytes on the line so far.
+    /// Number of bytes that have crossed the line so far.
     seen: u64,
     rest: Line,
 }

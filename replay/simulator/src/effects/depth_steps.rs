@@ -1,4 +1,4 @@
-//! Quantisation of depth.
+//! Quantisation of reported depths.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};

@@ -1,4 +1,4 @@
-//! Heads that stall for a while.
+//! Heads that stall for a while and ping at one angle.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};

@@ -1,4 +1,4 @@
-//! Biases of inertial units.
+//! Biases of inertial units: turn rate, force and attitude.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};

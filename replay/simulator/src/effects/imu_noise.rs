@@ -1,4 +1,4 @@
-//! Noise of inertial units.
+//! White noise of inertial units.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -17,7 +17,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Blocks of random numbers. Each vector takes two blocks.
+/// Numbers of the first block of random numbers for each quantity. Each vector takes two blocks.
 const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;

@@ -168,12 +168,12 @@ struct Ear<'a> {
     step: u64,
     /// Least and largest range at which the head takes a sound as its echo, m.
     within_m: [f64; 2],
-    /// Whether another head's ping has been heard.
+    /// Whether this head has taken another head's ping as its echo.
     heard: bool,
 }
 
 impl Ear<'_> {
-    /// Listens for another head's pings.
+    /// Listens for the pings of another head.
     fn hear(&mut self, other: u64, sounds: &Hears) {
         let apart_m = (sounds.spec.mount.position + -self.hears.spec.mount.position).norm();
         if apart_m <= sounds.spec.body.radius_m.max(self.hears.spec.body.radius_m) {

@@ -1,4 +1,4 @@
-//! Delay of messages.
+//! Delay of messages from devices.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};

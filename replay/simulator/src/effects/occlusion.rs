@@ -122,7 +122,7 @@ impl Parameters {
 }
 
 impl Occlusion {
-    /// Range of the first obstacle on a beam, m.
+    /// Range of the first obstacle that a beam meets, m.
     fn range_m(&self, mount: &Mount, direction: Vec3<Body>) -> Option<f64> {
         let entered =
             self.obstacles.iter().filter_map(|obstacle| obstacle.enters_m(mount.position, direction));

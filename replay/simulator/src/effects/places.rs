@@ -1,4 +1,4 @@
-//! The stretches of tunnel in which an effect acts.
+//! The stretches of the tunnel in which an effect acts on each sensor.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -75,7 +75,7 @@ impl<P> Places<P> {
         self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)).map(|(_, parameters)| parameters)
     }
 
-    /// Returns the same stretches with converted parameters.
+    /// Returns the same stretches, with the effect's parameters converted by `how`.
     pub(super) fn map<Q>(&self, mut how: impl FnMut(&P) -> Q) -> Places<Q> {
         Places(self.0.iter().map(|(stretch, parameters)| (*stretch, how(parameters))).collect())
     }

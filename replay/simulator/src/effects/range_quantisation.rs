@@ -1,4 +1,4 @@
-//! Quantisation of ranges.
+//! Quantisation of measured ranges.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};

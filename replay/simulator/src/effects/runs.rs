@@ -56,7 +56,7 @@ impl Runs {
         chance < in_run
     }
 
-    /// Correlation between the states of consecutive pings.
+    /// Correlation of being in a run between consecutive pings.
     #[cfg(test)]
     pub(super) fn correlation(&self) -> f64 {
         self.go_on - self.begin

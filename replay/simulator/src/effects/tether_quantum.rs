@@ -1,4 +1,4 @@
-//! Quantisation of the cable counter.
+//! Quantisation of the cable counter's readings.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};

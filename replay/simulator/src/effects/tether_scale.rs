@@ -29,7 +29,7 @@ pub(super) struct TetherScaleKind;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Parameters {
     share: f64,
-    /// Strain per metre of cable out, 1/m.
+    /// Mean strain of the cable per metre of cable out, 1/m.
     strain_pm: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Slack of the cable that varies.
+//! Slack of the cable that varies during the dive.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};

@@ -11,14 +11,14 @@ use super::shapes::Solid;
 use super::vector::Frame;
 use super::widths::floor_m;
 
-/// Allowed sizes of a boulder, m.
+/// Allowed diameters of a boulder, m.
 const SIZE_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 /// Default share of a boulder's thickness that lies below the wall.
 const SUNK: f64 = 0.3;
 /// Minimum ratio of width to length, and of thickness to width, of a scattered boulder.
 const FLATTEST: f64 = 0.5;
 
-/// An ellipsoid on the wall.
+/// A boulder: an ellipsoid on the wall.
 struct Boulder {
     chainage_m: f64,
     arc_m: f64,
@@ -167,7 +167,7 @@ fn power(base: f64, exponent: f64) -> f64 {
     result
 }
 
-/// Reads `size_m`, one diameter or three.
+/// Reads `size_m` of one boulder: one diameter or three.
 fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     let wanted = format!(
         "must be a diameter from {} to {}, or three: along the tunnel, along the wall, across the wall",
@@ -182,7 +182,7 @@ fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     }
 }
 
-/// Reads `size_m`, the smallest and the largest size.
+/// Reads `size_m` of many boulders: the smallest and the largest diameter.
 fn parse_sizes(table: &Section<'_>) -> Result<Option<[f64; 2]>, ConfigError> {
     match table.numbers("size_m", SIZE_M)?.as_deref() {
         None => Ok(None),

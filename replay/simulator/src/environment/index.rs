@@ -1,4 +1,4 @@
-//! Index of objects by chainage.
+//! Index of objects in the tunnel by chainage.
 
 use headrace_geometry::math;
 

@@ -9,7 +9,7 @@ use crate::mesh::Mesh;
 /// is open in the plane itself.
 const INTO_M: f64 = 1e-7;
 
-/// A closed mesh in the water.
+/// A closed mesh that is a body in the water.
 #[derive(Debug, Clone)]
 pub(super) struct MeshBody {
     pub(super) frame: Frame,
@@ -49,7 +49,7 @@ impl MeshWall {
         self.feature
     }
 
-    /// Chainages between which the mesh is the wall, m.
+    /// Chainages between which the mesh is the tunnel's wall, m.
     pub(super) fn span_m(&self) -> (f64, f64) {
         (self.from_m, self.to_m)
     }

@@ -19,7 +19,7 @@ pub(super) struct Placed<S> {
     pub(super) span_m: (f64, f64),
 }
 
-/// The tunnel before its wall is displaced.
+/// Properties of the tunnel before its wall is displaced.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {
     pub(super) profile: &'a Profile,

@@ -17,7 +17,7 @@ const LEAST_COSINE: f64 = 0.25;
 /// Standard deviation of the sum of four 16-bit random numbers, in units of their range: the square root of 4 / 12.
 const SUM_SD: f64 = 0.577_350_269_189_625_8;
 
-/// Rough stretches of the tunnel.
+/// Rough stretches of the tunnel, each with the heights of its wall.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Roughness(Vec<(Stretch, Heights)>);
 

@@ -17,14 +17,14 @@ use super::vector::{Ray, V3, along, dot, unit};
 /// no wall between tube and hollow.
 pub(super) const SKIN_M: f64 = 1e-6;
 
-/// A body that stops a ray.
+/// A solid body that stops a ray.
 #[derive(Debug, Clone)]
 pub(super) enum Solid {
     /// An ellipsoid with these half diameters along the axes of the frame, m.
     Ellipsoid(Frame, V3),
     /// A box with these half lengths along the axes of the frame, m.
     Block(Frame, V3),
-    /// A body enclosed by triangles.
+    /// A body enclosed by the triangles of a mesh.
     #[cfg(feature = "mesh")]
     Mesh(MeshBody),
 }
@@ -34,7 +34,7 @@ pub(super) enum Solid {
 pub(super) enum Hollow {
     /// A box with these half lengths along the axes of the frame, m.
     Block(Frame, V3),
-    /// A slot around the whole tunnel.
+    /// A slot around the whole tunnel, as for a gate.
     Ring(Ring),
 }
 

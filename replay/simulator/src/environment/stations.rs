@@ -1,4 +1,4 @@
-//! Scale of the profile along the tunnel.
+//! Scale of the tunnel's profile along the tunnel.
 
 use headrace_config::{ConfigError, Section};
 

@@ -6,7 +6,7 @@ use headrace_geometry::tunnel::Profile;
 
 use super::bulge::Bulge;
 
-/// Number of directions in which a profile is sampled.
+/// Number of directions in which a profile's wall is sampled.
 const DIRECTIONS: u32 = 2_000;
 /// Safety factor on the slope of the gauge, for directions between the samples.
 const MARGIN: f64 = 1.05;
@@ -27,14 +27,14 @@ pub(super) struct Steepness {
 #[derive(Debug, Clone, Copy)]
 struct View {
     arc_m: f64,
-    /// Distance from the reference point to the wall, m.
+    /// Distance from the reference point to the wall in this direction, m.
     radius_m: f64,
     /// Distance from the reference point to the wall's tangent, m.
     tangent_m: f64,
 }
 
 impl Steepness {
-    /// Samples a profile.
+    /// Samples the wall of a profile.
     ///
     /// Allocates: startup only.
     pub(super) fn new(profile: &Profile) -> Self {

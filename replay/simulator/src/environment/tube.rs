@@ -31,7 +31,7 @@ const FEATURE_M: f64 = 1e-3;
 /// Half the distance between the points whose difference gives the normal of a displaced wall, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
-/// The wall along the whole tunnel.
+/// The tunnel's wall along the whole tunnel, except openings.
 #[derive(Debug, Clone)]
 pub(super) struct Tube {
     axis: Axis,
@@ -64,7 +64,7 @@ struct Stretch {
     step_m: f64,
 }
 
-/// Passage of a ray through the tube.
+/// Passage of a ray through the water in the tube.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Passage {
     /// Distance along the ray at which the ray leaves the tube or reaches the given limit, m.
@@ -145,12 +145,12 @@ impl Tube {
         self.mesh_over(from_m, to_m).map(|(_, mesh)| mesh.feature())
     }
 
-    /// The tunnel's axis.
+    /// The axis of the tunnel.
     pub(super) fn axis(&self) -> &Axis {
         &self.axis
     }
 
-    /// The profile before it is scaled or displaced.
+    /// The tunnel's profile before it is scaled or displaced.
     pub(super) fn profile(&self) -> &Profile {
         &self.profile
     }
@@ -161,7 +161,7 @@ impl Tube {
         half_width_m(&self.profile) * self.scales.largest() + outwards_m
     }
 
-    /// Scale of the profile at `chainage_m`.
+    /// Scale of the tunnel's profile at `chainage_m`.
     pub(super) fn scale(&self, chainage_m: f64) -> f64 {
         self.scales.at(chainage_m)
     }
@@ -199,7 +199,7 @@ impl Tube {
         Some(hit.range_m)
     }
 
-    /// Whether `point` is in the tube.
+    /// Whether `point` is in the tube, which is bounded by the tunnel's wall.
     pub(super) fn contains(&self, point: V3) -> bool {
         let (number, _) = self.locate(point);
         self.stretches.get(number).is_some_and(|stretch| self.holds(stretch, point))
@@ -236,7 +236,7 @@ impl Tube {
         None
     }
 
-    /// The wall's face at a point of the wall.
+    /// The wall's face (normal and feature) at a point of the wall.
     pub(super) fn face(&self, point: V3) -> Face {
         let (number, chainage_m) = self.locate(point);
         let wall = Face { normal: [0.0; 3], feature: None };
@@ -307,7 +307,7 @@ impl Tube {
         if self.holds(to, ray.at(t_m)) {
             return None;
         }
-        // The axis is straight at a mesh.
+        // The tunnel's axis is straight at a mesh.
         let [tx, ty] =
             if to.mesh.is_some() { to.piece.station(to.from_m) } else { from.piece.station(from.from_m) }
                 .tangent;
@@ -404,7 +404,7 @@ impl Tube {
         unit(fall)
     }
 
-    /// Number of the feature that displaces the wall most.
+    /// Number of the feature that displaces the wall most at a point.
     fn displaced_by(&self, stretch: &Stretch, chainage_m: f64, arc_m: f64) -> Option<u16> {
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));

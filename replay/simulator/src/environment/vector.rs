@@ -18,7 +18,7 @@ pub(super) struct Ray {
 }
 
 impl Ray {
-    /// The point `t_m` along the ray.
+    /// The point at distance `t_m` along the ray.
     pub(super) fn at(&self, t_m: f64) -> V3 {
         along(self.origin, t_m, self.direction)
     }
@@ -79,10 +79,10 @@ impl Frame {
     }
 }
 
-/// The wall at one point.
+/// The face of the wall at one point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Face {
-    /// Unit normal, towards the water.
+    /// Unit normal of the wall, towards the water.
     pub(super) normal: V3,
     /// Number of the feature that displaced the wall at the point.
     pub(super) feature: Option<u16>,

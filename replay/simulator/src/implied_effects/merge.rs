@@ -24,7 +24,7 @@ struct Piece {
     keys: Keys,
 }
 
-/// Merges the calls for each effect.
+/// Merges the calls for each implied effect into its tables.
 pub(super) fn merge(calls: &[Call]) -> Vec<Called> {
     let mut all = Vec::new();
     for kind in KINDS {

@@ -25,7 +25,7 @@ pub enum Take {
     Called,
 }
 
-/// An effect that a scene implies.
+/// An effect that a scene implies, with its tables.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Called {
     /// Name of the effect.
@@ -63,7 +63,7 @@ impl Fate {
     }
 }
 
-/// A value of an effect's key, as TOML.
+/// A value of an effect's key, as TOML text.
 type Value = String;
 
 /// A call: one reason to simulate an effect, with the sensors, the range of chainage and the keys that follow from it.

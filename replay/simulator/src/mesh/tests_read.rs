@@ -173,7 +173,7 @@ fn wrong_counts_allocate_no_memory() {
     long_list.extend([0xFF; 4]);
     let words = refused(&long_list);
     assert!(words.contains("end of file") && words.contains("'face'"), "{words}");
-    // A truncated file in text encoding.
+    // A file in text encoding that is cut off.
     let text = file(u64::MAX, "uint").replace("binary_little_endian", "ascii");
     assert!(refused(text.as_bytes()).contains("end of file"));
 }

@@ -90,7 +90,7 @@ impl Knots {
 /// Control points are half a period apart and uniformly distributed. The standard deviation is 0.4 of the amplitude.
 pub fn wandering(stream: Stream, duration_s: f64, period_s: f64, reach: Offsets) -> Knots {
     Knots::new(duration_s, period_s / 2.0, |k| {
-        // The number of the first knot is -1.
+        // The first control point has number -1.
         let step = (k + 1).unsigned_abs();
         let numbers = [0, 1, 2].map(|block| stream.block(step, block).uniform());
         let mut point = reach;

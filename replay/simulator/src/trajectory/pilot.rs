@@ -7,14 +7,14 @@ use super::knots::{Knots, Offsets, wandering};
 use super::place::Place;
 use crate::random::Stream;
 
-/// Time between two decisions, s.
+/// Time between two decisions of the pilot, s.
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
 /// Ratio of a dive's duration to its duration without stops, above which the dive counts as endless.
 const MOST_TIMES_AS_LONG: f64 = 50.0;
 
-/// Parameters of a pilot.
+/// Parameters of a pilot who gets no advice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pilot {
     /// Chainages of the dive's start and end, m.
@@ -131,7 +131,7 @@ impl Piloted {
         place
     }
 
-    /// Recomputes the trajectory for a current.
+    /// Recomputes the pilot's trajectory for a current.
     pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
         self.go(flow).map_err(|why| format!("carries the vehicle off: it {why}"))
     }

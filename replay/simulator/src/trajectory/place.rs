@@ -1,4 +1,4 @@
-//! Positions along the tunnel, relative to the axis.
+//! Poses of the vehicle along the tunnel, relative to the axis.
 
 use super::knots::Offsets;
 

@@ -1,4 +1,4 @@
-//! Waypoints, with one speed for each stretch between waypoints.
+//! Trajectories through waypoints, with one speed for each stretch between waypoints.
 
 use headrace_geometry::math;
 
@@ -12,7 +12,7 @@ pub(super) const SPACING_S: f64 = 0.5;
 pub(super) struct Waypoint {
     /// Position and attitude of the vehicle at the waypoint.
     pub(super) at: Offsets,
-    /// Speed from the previous waypoint, m/s.
+    /// Speed from the previous waypoint to this one, m/s.
     pub(super) speed_mps: f64,
     /// Duration of the stop at the waypoint, s.
     pub(super) stay_s: f64,

@@ -1,4 +1,4 @@
-//! Combinations of effects on sonars.
+//! Tests of combinations of effects on sonars.
 
 use crate::testing::{Dive, Dived};
 use crate::truth::TruthRow;

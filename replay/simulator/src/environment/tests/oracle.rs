@@ -8,7 +8,7 @@ const STEP_M: f64 = 2e-3;
 /// Length over which the model follows rays, m.
 pub(super) const FAR_M: f64 = 20.0;
 
-/// A profile with a closed form for its wall.
+/// A tunnel profile with a closed form for its wall.
 #[derive(Clone, Copy)]
 pub(super) enum Shape {
     Circle(f64),
@@ -141,7 +141,7 @@ impl Oracle {
         [s, (p[1] - at[1]) * math::cos(heading) - (p[0] - at[0]) * math::sin(heading), p[2]]
     }
 
-    /// Chainage and y of a point, without an estimate.
+    /// Chainage and y of a point, searched without an estimate.
     pub(super) fn search(&self, p: V3) -> V3 {
         let distance = |s: &f64| {
             let (at, _) = self.station(*s);
