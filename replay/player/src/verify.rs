@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn records_missing_from_a_log_are_skipped() {
+    fn live_records_missing_from_the_log_are_skipped_in_the_comparison() {
         let mut stream = Stream::default();
         let head = RecordKind::Run as u64 | (1 << 8);
         stream.wait(Batch { tick: 4, next: 0, words: vec![head, 7], at: 0 }, "poses");

@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn agreeing_timestamps_give_no_findings() {
+    fn header_times_that_agree_with_record_times_give_no_findings() {
         let (times, said) = words(Base::Record, &[(1000 * S, 1000 * S - 3), (1001 * S, 1001 * S - 900)]);
         assert_eq!((times, said.as_str()), (vec![1000 * S, 1001 * S], ""));
         assert_eq!(words(Base::Header, &[(1000 * S, 1000 * S - 3)]).0, [1000 * S - 3]);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn clock_offsets_are_reported() {
+    fn clock_offsets_of_message_headers_are_reported() {
         assert!(words(Base::Record, &[(10 * S, 11 * S)]).1.contains("up to 1.000 s later"));
         assert!(
             words(Base::Record, &[(10 * S, 8 * S)])

@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn files_without_statistics_have_no_message_count() {
+    fn mcap_files_without_statistics_state_no_message_count() {
         let endless = [&[0x08][..], &u64::MAX.to_le_bytes(), &[7; 100]].concat();
         for (summary, at) in [(&record(0x08, &[7; 100])[..], 50), (&[], 0), (&endless, 50), (&[], u64::MAX)] {
             assert_eq!(stated(summary, at), None);

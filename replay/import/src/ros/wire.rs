@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_counts_are_refused() {
+    fn sequence_counts_beyond_the_message_are_refused() {
         let bytes = [0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 3, 4];
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().single_sequence(), None);
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().text(), None);

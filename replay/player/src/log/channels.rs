@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_defined_after_a_position_are_forgotten_on_going_back() {
+    fn channels_defined_after_a_position_are_forgotten_on_return_to_it() {
         let mut channels = channels(&[("/raw/a", None)]);
         let first = channels.get(0).unwrap().definition.clone();
         for (id, topic) in [(7, "/raw/b"), (5, "/imu"), (9, "/sent/c")] {

@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_beyond_the_record_are_none() {
+    fn fields_beyond_the_end_of_a_record_are_none() {
         assert_eq!(Fields::new(&[5, 0, 0, 0, b'a']).text(), None);
         assert_eq!(Fields::new(&[0xFF; 12]).map(), None);
         assert_eq!(Fields::new(&[1, 0, 0, 0, 0xFF]).text(), None);

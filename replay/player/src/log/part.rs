@@ -191,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn part_file_names_contain_the_number_and_sort_by_it() {
+    fn part_file_names_contain_the_part_number_and_sort_by_it() {
         let recording = Path::new("logs/gate 3.mcap");
         let names: Vec<PathBuf> = [1, 2, 10, 100].map(|number| part_path(recording, number)).into();
         assert_eq!(names.first(), Some(&PathBuf::from("logs/gate 3.part001.mcap")));

@@ -316,13 +316,13 @@ mod tests {
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn model_detects_a_recorder_that_takes_incomplete_entries() {
+    fn interleaving_model_detects_a_recorder_that_takes_incomplete_entries() {
         explored("the recorder's queue, a message not waited for", Hasty, as_it_is);
     }
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn model_detects_a_recorder_that_reads_the_stop_flag_last() {
+    fn interleaving_model_detects_a_recorder_that_reads_the_stop_flag_last() {
         explored(
             "the recorder's stop, the flag read last",
             |consumer| consumer,

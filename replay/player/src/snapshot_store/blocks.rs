@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn insertion_changes_only_the_blocks_around_it() {
+    fn insertion_of_bytes_changes_only_the_blocks_around_it() {
         let bytes = noise(4 << 20, 2);
         let mut longer = bytes.clone();
         longer.splice(1_000_000..1_000_000, noise(777, 3));

@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn sensors_of_other_kinds_are_refused() {
+    fn depth_quantisation_of_other_sensors_is_refused() {
         assert!(refusal("[effects.depth_steps]\nsensors = [\"imu\"]\n").contains("can act on: depth"));
     }
 }

@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn units_on_one_vehicle_feel_the_same_bumps() {
+    fn inertial_units_on_one_vehicle_feel_the_same_bumps() {
         let felt = |unit: &'static str| {
             let force = |keys: &str| {
                 let samples = Bench::turning(keys).with_unit(unit).run::<Inertia>(unit);

@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn attitudes_scatter_about_each_axis() {
+    fn attitude_noise_has_the_given_strength_about_each_axis() {
         let (plain, noisy) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let mut squares = [0.0; 3];
         for (plain, noisy) in plain.iter().zip(&noisy) {

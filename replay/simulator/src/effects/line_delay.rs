@@ -131,7 +131,7 @@ mod tests {
     /// Messages are far apart, so that none delays the next one. Mean and variance of the delay are then those of an
     /// exponential distribution.
     #[test]
-    fn jitter_is_exponential() {
+    fn message_delay_jitter_is_exponentially_distributed() {
         let parameters = Parameters { latency_s: 0.0, jitter_s: 0.003 };
         let stream = Stream::new(4, "line_delay", "head");
         let mut delay = LineDelay { parameters, stream, received: 0, last: MonoNs(0) };

@@ -141,7 +141,7 @@ mod tests {
 
     /// The pings of a run share one range, with the given spread. The next run has another range.
     #[test]
-    fn clusters_have_the_given_share_run_length_and_spread() {
+    fn near_return_clusters_have_the_given_share_run_length_and_spread() {
         let (share, mean) = (0.1, 6.0);
         let near = near("share = 0.1\nmean_run = 6\nnear_m = 0.8\nfar_m = 2\nspread_m = 0.05");
         let runs: Vec<Vec<f64>> = near

@@ -135,7 +135,7 @@ mod tests {
 
     /// At each step, an effect uses the same random numbers in a stretch as in the whole tunnel.
     #[test]
-    fn stretches_that_cover_the_tunnel_equal_the_whole_tunnel() {
+    fn effect_in_adjacent_stretches_equals_the_effect_in_the_whole_tunnel() {
         let dive = Dive { seconds: 40.0, ..Dive::with_head() };
         for effect in
             ["outliers]]\nshare = 0.4\n", "range_noise]]\nsd_m = 0.1\n", "missing_returns]]\nshare = 0.2\n"]

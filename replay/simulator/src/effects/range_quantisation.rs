@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_and_conflicting_steps_are_refused() {
+    fn missing_and_conflicting_quantisation_steps_are_refused() {
         let refusal =
             |dive: &Dive, keys: &str| dive.refusal(&format!("[effects.range_quantisation]\n{keys}"));
         assert!(refusal(&Dive::with_sounder(), "").contains("no range setting"));

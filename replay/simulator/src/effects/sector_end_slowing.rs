@@ -130,7 +130,7 @@ mod tests {
     /// The command reverses at time 0, long after its previous reversal. The head then moves at w (2 exp(-t / T) - 1),
     /// and reverses at T ln 2.
     #[test]
-    fn steps_are_short_at_reversals_and_full_elsewhere() {
+    fn head_steps_are_short_at_reversals_and_full_elsewhere() {
         let (plain, slowed) = (pings(""), pings(KEYS));
         let step_rad = turned(&plain[0], &plain[1]).abs();
         let period_s = between_s(&plain[0], &plain[1]);

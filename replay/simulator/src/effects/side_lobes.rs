@@ -133,7 +133,7 @@ mod tests {
     use crate::testing::{Dive, assert_share};
 
     #[test]
-    fn inner_lobe_of_oblique_beam_is_heard() {
+    fn inner_side_lobe_of_oblique_beam_is_heard() {
         let dive = Dive::with_head();
         let effects = "[effects.side_lobes]\nangle_deg = 8\nshare = 1";
         let lobe_rad = f64::to_radians(8.0);

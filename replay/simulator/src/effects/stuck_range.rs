@@ -85,7 +85,7 @@ mod tests {
     use crate::testing::Dive;
 
     #[test]
-    fn stuck_range_is_constant_within_its_times_and_true_otherwise() {
+    fn stuck_range_is_constant_from_start_to_end_and_true_otherwise() {
         let dive = Dive { seconds: 30.0, ..Dive::with_head() };
         let effect = "[effects.stuck_range]\nrange_m = 0.7\nfrom_s = 10\nto_s = 20";
         let (base, dived) = (dive.dive(""), dive.dive(effect));
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_times_are_refused() {
+    fn stuck_range_that_ends_before_its_start_is_refused() {
         let refusal = Dive::with_head().refusal("[effects.stuck_range]\nfrom_s = 5\nto_s = 4");
         assert!(refusal.contains("must be above from_s"));
     }

@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn different_seeds_are_independent() {
+    fn rough_walls_of_different_seeds_are_independent() {
         let other = Heights { seed: 8, ..HEIGHTS };
         let product = mean((0..50_000).map(|k| {
             let at = Point3::new(f64::from(k) * 0.371, 0.2, 0.9);

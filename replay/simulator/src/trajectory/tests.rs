@@ -121,7 +121,7 @@ fn pilot_goes_back_the_given_distance() {
 }
 
 #[test]
-fn pilot_depends_only_on_the_seed() {
+fn pilot_trajectory_depends_only_on_the_seed() {
     let at = |seed| parsed(&format!("{PILOT}to_m = 60\n"), seed).unwrap().0;
     assert_eq!(at(4), at(4));
     assert_ne!(at(4), at(5));

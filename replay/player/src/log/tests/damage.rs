@@ -106,7 +106,7 @@ fn long_log() -> (Vec<u8>, Vec<Seen>) {
 }
 
 #[test]
-fn unreadable_bytes_are_a_loss_and_the_rest_is_read() {
+fn unreadable_bytes_are_reported_as_a_loss_and_the_rest_is_read() {
     let (bytes, seen) = long_log();
     let chunks = places(&bytes, op::CHUNK);
     let mut told = 0;

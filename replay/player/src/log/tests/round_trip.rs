@@ -50,7 +50,7 @@ fn log_with_ticks_is_read_in_the_order_of_writing() {
 }
 
 #[test]
-fn written_header_is_read_back() {
+fn written_log_header_is_read_back() {
     let written = header(true);
     let (bytes, _) = LogWriter::new(Vec::new(), &written).unwrap().finish().unwrap();
     let reader = open(&bytes);

@@ -113,7 +113,7 @@ fn detected_share_matches_the_sonar_equation() {
 
 /// The vehicle's own parts are detected even if no wall is detected.
 #[test]
-fn parts_of_the_vehicle_are_always_detected() {
+fn echoes_of_vehicle_parts_are_always_detected() {
     let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";
     let dive = Dive { vehicle: hull, ..Dive::with_head() };
     let plain = dive.dive("[effects.occlusion]").ranges_m(0);
@@ -128,7 +128,7 @@ fn parts_of_the_vehicle_are_always_detected() {
 }
 
 #[test]
-fn absorption_follows_water_temperature() {
+fn sound_absorption_follows_water_temperature() {
     let head = Dive::with_head().scene("").unwrap().facts.sensors[0].head.unwrap();
     for temperature_degc in [4.0, 25.0] {
         let parameters = Parameters {

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn old_pings_are_dropped_except_two() {
+    fn old_pings_are_dropped_except_the_last_two() {
         let mut pings = Pings((0..10).map(|k| ping(20 * k, 0.0)).collect());
         let from = |ms| MonoNs(1_000_000_000) + DurNs::from_millis(ms);
         pings.forget(from(200), 0.05);

@@ -166,7 +166,7 @@ fn idealised_heads_in_one_place_do_not_hear_each_other() {
 }
 
 #[test]
-fn single_head_is_refused() {
+fn interference_of_a_single_head_is_refused() {
     assert!(
         Dive::with_head().refusal("[effects.interference]").contains("has one head; at least two are needed")
     );

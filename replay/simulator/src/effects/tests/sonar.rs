@@ -62,7 +62,7 @@ fn adding_a_head_keeps_the_random_numbers_of_the_first_head() {
 }
 
 #[test]
-fn all_effects_together_do_not_depend_on_time_slice_length() {
+fn all_sonar_effects_together_do_not_depend_on_time_slice_length() {
     pair().assert_slices_dont_matter(&EFFECTS.concat());
 }
 
