@@ -181,7 +181,7 @@ fn wrong_element_counts_in_ply_files_allocate_no_memory() {
 proptest! {
     /// Arbitrary bytes give a mesh or an error, and never a panic.
     #[test]
-    fn arbitrary_bytes_give_a_mesh_or_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
+    fn arbitrary_bytes_give_mesh_or_error(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
         let starts = ["", "ply\nformat ascii 1.0\n", "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float "];
         let bytes = [starts[start].as_bytes(), &bytes].concat();
         if let Ok(t) = read(&bytes) {
