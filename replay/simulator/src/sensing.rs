@@ -145,7 +145,7 @@ impl Scenery {
         self.trajectory.place(self.under_way_s(at)).chainage_m
     }
 
-    /// Time since the vehicle started moving, s, at time `at`.
+    /// Time for which the vehicle has been moving at time `at`, s.
     fn under_way_s(&self, at: MonoNs) -> f64 {
         self.sets_out
             .map_or_else(|| at.since(START).as_secs_f64(), |out| at.since(out).as_secs_f64().max(0.0))

@@ -269,7 +269,7 @@ mod tests {
 
     /// Explores all interleavings of a loop and a recorder.
     ///
-    /// The loop pushes two entries and sets the flag. The recorder takes entries until `until` ends it.
+    /// The loop pushes two entries and sets the stop flag. The recorder takes entries until `until` ends it.
     fn explored<R: ByteConsumer + 'static>(
         name: &str,
         reading: fn(ModelConsumer) -> R,

@@ -28,7 +28,7 @@ const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
 /// Number of attempts to write the rest after the dive has ended.
 const LAST_ATTEMPTS: u32 = 3;
-/// Maximum number of statements kept while no part can be begun.
+/// Maximum number of statements of losses kept while no part can be begun.
 const MAX_STATEMENTS: usize = 100;
 /// Maximum number of names tried for a part, if files with these names exist.
 const NAMES: u32 = 1000;
@@ -283,7 +283,7 @@ impl Recording {
         add(&mut self.sum.faults, fault);
     }
 
-    /// Writes the statements and the backlog to the part just begun, and syncs it.
+    /// Writes the statements of losses and the backlog of messages to the part just begun, and syncs it.
     fn write_again(&mut self, path: &Path) -> Result<(), LogError> {
         let Some(part) = &mut self.open else { return Ok(()) };
         if let Some(outage) = &mut self.outage {

@@ -68,7 +68,7 @@ pub(super) struct Heeding {
     /// Whether the pilot stops when advised to, and waits for the first advice before setting out. The monitor advises
     /// stops to estimate gyro biases, or if it has no position.
     pub(super) stands: bool,
-    /// Time that the pilot waits before setting out, s, at the dive's start.
+    /// Time that the pilot waits at the dive's start before setting out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
     /// Maximum duration of the dive, s.
