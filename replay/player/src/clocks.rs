@@ -23,7 +23,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Whether a timestamp may be from this clock.
+    /// Whether a timestamp may come from this clock.
     pub(crate) fn is_of(&self, at: MonoNs) -> bool {
         (self.from.0.saturating_sub(YEAR_NS)..=self.to.0.saturating_add(YEAR_NS)).contains(&at.0)
     }

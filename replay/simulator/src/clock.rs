@@ -4,7 +4,7 @@ use bevy_ecs::prelude::Component;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Start time of simulated dives.
+/// Time at which every simulated dive starts.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
 /// Number of parts in a second. A drift is a whole number of parts per second, so that no sum depends on rounding.
@@ -24,7 +24,7 @@ impl Clock {
         Self { longer: i128::from(math::round_to_i64(ppm.clamp(-1e5, 1e5) * per_ppm)) }
     }
 
-    /// True time at which the clock shows `shown`.
+    /// True time at which the device's clock shows `shown`.
     pub(crate) fn truly(&self, shown: MonoNs) -> MonoNs {
         let span = i128::from(shown.since(START).0);
         let true_span = span + (span * self.longer).div_euclid(PARTS);

@@ -7,15 +7,15 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout,
 
 use crate::sensing::{Line, Samples, Source};
 
-/// Maximum number of figures in a measurement.
+/// Maximum number of numerical values (figures) in a measurement.
 const FIGURES: usize = 10;
 
-/// The figures of a measurement, with their names.
+/// Numerical values (figures) of a measurement, with their names.
 pub(crate) trait Figures: Measurement {
-    /// Names of the figures, with units.
+    /// Names of the measurement's values, with units.
     const NAMES: &'static [&'static str];
 
-    /// Values of the figures; NaN for a missing value.
+    /// The measurement's values; NaN for a missing value.
     fn figures(&self) -> [f64; FIGURES];
 }
 
@@ -82,24 +82,24 @@ impl Figures for Inertia {
     }
 }
 
-/// One change made by an effect.
+/// One change of a measurement by an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Note {
-    /// Number of the sensor.
+    /// Number of the sensor whose measurement was changed.
     pub source: u16,
-    /// Number of the measurement within the slice.
+    /// Number of the measurement within the current time slice.
     pub sample: usize,
-    /// Index of the effect in the scene.
+    /// Index of the effect in the scene's list of effects.
     pub effect: u16,
-    /// Name of the changed figure.
+    /// Name of the changed value.
     pub what: &'static str,
-    /// Value before the change; NaN if there was none.
+    /// The value before the change; NaN if there was none.
     pub from: f64,
-    /// Value after the change.
+    /// The value after the change.
     pub to: f64,
 }
 
-/// The changes in the slice.
+/// All changes by effects in the current time slice.
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Notes(pub(crate) Vec<Note>);
 

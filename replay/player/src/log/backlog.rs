@@ -11,7 +11,7 @@ use super::writer::{Lane, LogHeader};
 /// Maximum memory of the messages, bytes. It is enough for some minutes of a dive with four heads.
 const MAX_BYTES: usize = 16 << 20;
 
-/// Properties of a message, without its bytes.
+/// Properties of an unsynced message, without its bytes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Head {
     pub(super) lane: Lane,
@@ -64,7 +64,7 @@ impl Backlog {
         Some(head)
     }
 
-    /// Returns the memory that the messages take, bytes.
+    /// Returns the memory that the unsynced messages take, bytes.
     pub(super) fn bytes(&self) -> usize {
         self.data.len() + self.heads.len() * size_of::<Head>()
     }
@@ -101,7 +101,7 @@ pub(super) struct Tally {
     messages: u64,
     tick: Option<u64>,
     next: BTreeMap<Lane, u32>,
-    /// Log time of the last message.
+    /// Log time of the recording's last message.
     pub(super) last: Option<MonoNs>,
 }
 

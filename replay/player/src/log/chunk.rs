@@ -15,13 +15,13 @@ use super::framing::{ChunkPlace, LogFile};
 use super::limits::{MAX_UNPACKED_BYTES, MAX_WINDOW_LOG, RECORD_COST};
 use super::{LogError, LossKind};
 
-/// Read size, bytes.
+/// Number of bytes read from the file at once.
 const READ_BYTES: usize = 1 << 20;
 
 /// Result of unpacking a chunk.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Unpacked {
-    /// The whole chunk is valid.
+    /// The whole chunk is valid and unpacked.
     Whole,
     /// The file ends within the chunk. The records before the end can be parsed, but no checksum covers them.
     Cut,
@@ -152,7 +152,7 @@ const SKIPPABLE: u32 = 0x184D_2A50;
 /// Decompressor of zstd for frames with windows of up to 2^[`MAX_WINDOW_LOG`] bytes.
 #[derive(Default)]
 struct Unzstd {
-    /// Decompression context, created on first use.
+    /// Decompression context of zstd, created on first use.
     context: Option<DCtx<'static>>,
     /// Number of bytes that zstd suggests to read next; 0 before a frame.
     need: usize,

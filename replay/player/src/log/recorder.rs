@@ -38,10 +38,10 @@ const SENT_MESSAGES: usize = 2048;
 const VOICES: usize = 8;
 /// Time to wait at the end for a medium that neither accepts data nor fails.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Capacity for events of the recording.
+/// Maximum number of waiting events about the recording.
 const EVENTS: usize = 64;
 
-/// Starts recorders.
+/// Starts recorders on threads of their own.
 pub struct Recorder;
 
 /// The loop's end of a recorder. Its methods don't block, allocate or make system calls.
@@ -50,7 +50,7 @@ pub struct RecorderPort {
     entries: Entries,
     state: Arc<State>,
     result_channels: usize,
-    /// Ticks skipped since the last recorded tick.
+    /// Ticks that were skipped since the last recorded tick.
     gap: Option<Gap>,
 }
 
@@ -229,7 +229,7 @@ impl RecorderPort {
         gap.packets += packets;
     }
 
-    /// Whether the last tick was skipped.
+    /// Whether the recorder skipped the last tick.
     pub fn is_behind(&self) -> bool {
         self.gap.is_some()
     }
@@ -239,7 +239,7 @@ impl RecorderPort {
         self.result_channels
     }
 
-    /// Returns the free bytes of the queue.
+    /// Returns the number of free bytes in the queue.
     pub fn vacant_bytes(&self) -> usize {
         self.entries.ring.vacant_len()
     }
@@ -315,7 +315,7 @@ impl RecorderHandle {
         self.state.unsafe_for()
     }
 
-    /// Returns a port for line traffic that doesn't pass through the loop.
+    /// Returns a port that records traffic with devices that doesn't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }

@@ -15,14 +15,14 @@ use super::{
 /// Metadata key of a recovered log. Its value is the name of the original log.
 pub const RECOVERED_FROM: &str = "recovered_from";
 
-/// Result of a recovery.
+/// Result of recovering a damaged log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recovered {
-    /// Number of messages written.
+    /// Number of messages written to the recovered log.
     pub messages: u64,
     /// Log times of the first and last message written, in log order.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// Losses, which the recovered log lists too.
+    /// Losses of the damaged log, which the recovered log lists too.
     pub losses: Vec<Loss>,
 }
 

@@ -21,7 +21,7 @@ use super::{DiveLog, LogError, MessageKind};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotKept {
-    /// The medium fails, or the recorder has ended.
+    /// The medium fails, or the recorder has already ended.
     #[error("the voice note isn't recorded: nothing is being recorded at present")]
     Failing,
     /// The queue of recordings is full.
@@ -33,10 +33,10 @@ pub enum NotKept {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VoiceMessageError {
-    /// The message is shorter than its fields state.
+    /// The message is shorter than the fields at its beginning.
     #[error("a voice message of {0} bytes is cut off in its head")]
     Short(usize),
-    /// The recording is invalid.
+    /// The recording in the message is invalid.
     #[error(transparent)]
     Voice(#[from] VoiceError),
 }

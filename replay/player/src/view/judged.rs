@@ -10,7 +10,7 @@ use headrace_monitor::section_judgement::SectionJudgement;
 use super::messages::{Level, Log, Missed, Section, Stretch, rounded};
 use super::site::Site;
 
-/// Minimum interval between lists of missed stretches.
+/// Minimum interval between two published lists of missed stretches.
 const EVERY: DurNs = DurNs(2_000_000_000);
 /// Maximum number of stretches in a list; the last ones along the tunnel are kept.
 ///
@@ -20,9 +20,9 @@ const MOST_STRETCHES: usize = 40;
 /// Judgements of all sections so far.
 #[derive(Debug, Default)]
 pub(super) struct Sections {
-    /// Flagged sections, each with its cause and the diameter of its hole, m.
+    /// Flagged sections by number, each with its cause and the diameter of its hole, m.
     flagged: BTreeMap<i64, (Cause, f64)>,
-    /// First and last section of each missed run.
+    /// First and last section of each missed run, by the run's number.
     runs: BTreeMap<u64, (i64, i64)>,
     /// Runs that have changed, each with its change.
     ///
@@ -99,7 +99,7 @@ impl Sections {
         })
     }
 
-    /// Makes the next list due at once.
+    /// Makes the next list of missed stretches due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }

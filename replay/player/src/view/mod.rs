@@ -184,7 +184,7 @@ impl View {
         Some(())
     }
 
-    /// Publishes the messages that are due at regular intervals.
+    /// Publishes the messages for viewers that are due at regular intervals.
     fn beat(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
         self.at = at;
         made.push_some(Topic::Points, self.points.close_before(at).as_ref());
@@ -286,7 +286,7 @@ impl DerivedChannels for View {
         let mut rest = words.as_slice();
         while let Some((record, after)) = first_record(rest) {
             rest = after;
-            // Records in the format of another version are skipped.
+            // Records of results in the format of another version are skipped.
             let _ = self.record(record, &mut made);
         }
         self.at = at;
@@ -296,7 +296,7 @@ impl DerivedChannels for View {
         let at = self.at;
         let mut made = Outbox { at, made };
         made.push_some(Topic::Points, self.points.close().as_ref());
-        // The last update is always published.
+        // The last state of the wall and of the missed stretches is always published, even if it isn't due yet.
         self.wall.hurry();
         self.sections.hurry();
         if let Some((x_m, _)) = self.last {
@@ -306,7 +306,7 @@ impl DerivedChannels for View {
     }
 }
 
-/// Collects messages for the log.
+/// Collects messages for viewers, to be written to the log.
 struct Outbox<'a> {
     /// Log time of the messages. It is that of the results they come from, so that log times don't go back.
     at: MonoNs,
@@ -327,7 +327,7 @@ impl Outbox<'_> {
     }
 }
 
-/// Words of a record, read in order.
+/// Words of a stored result record, read in order.
 struct Words<'a>(&'a [u64]);
 
 impl Words<'_> {
@@ -347,7 +347,7 @@ impl Words<'_> {
         Some(first.map(f64::from_bits))
     }
 
-    /// Returns the element of `all` whose number is the next word.
+    /// Returns the element of `all` whose index is the next word of the record.
     fn one_of<T: Copy>(&mut self, all: &[T], number: impl Fn(T) -> u64) -> Option<T> {
         let word = self.integer()?;
         all.iter().copied().find(|kind| number(*kind) == word)

@@ -5,9 +5,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use super::messages::{Field, PointCloud, Pose, Turn, Xyz, base64, rounded};
 use super::site::TUNNEL;
 
-/// Maximum time span of a cloud.
+/// Maximum time span of a point cloud.
 const SPAN: DurNs = DurNs(500_000_000);
-/// Maximum number of points in a cloud.
+/// Maximum number of points in a point cloud.
 const MOST_POINTS: usize = 4096;
 /// Length of a point, bytes: three floats.
 ///
@@ -26,7 +26,7 @@ const PARTS_PER_M: f64 = 256.0;
 /// dropped.
 const FARTHEST_M: f64 = 128.0;
 
-/// Points of the current cloud.
+/// Points of the current point cloud.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     began: Option<MonoNs>,
@@ -59,7 +59,7 @@ impl Points {
         if (0..SPAN.0).contains(&age) { None } else { self.close() }
     }
 
-    /// Returns the current cloud, and begins another.
+    /// Returns the current point cloud, and begins another.
     pub(super) fn close(&mut self) -> Option<PointCloud> {
         let began = self.began.take()?;
         let data = base64(&self.data);

@@ -1,4 +1,4 @@
-//! A current along the tunnel.
+//! A current of the water along the tunnel.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
@@ -93,7 +93,7 @@ impl Effect for Current {
 }
 
 impl Current {
-    /// Displacement of the vehicle by gusts since the start.
+    /// Displacement of the vehicle by gusts since the dive's start.
     fn carried(&self, stream: Stream, duration_s: f64) -> Knots {
         let [start_m, ..] = self.carried_from(0.0, stream, duration_s).at(0.0);
         self.carried_from(-start_m, stream, duration_s)

@@ -1,4 +1,4 @@
-//! Heads that stall for a while.
+//! Heads that stall for a while and ping at one angle.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -43,7 +43,7 @@ struct HeadStalls {
     behind: Behind,
 }
 
-/// Times of stalls.
+/// Draws the times at which a head stalls.
 struct Stalls {
     stream: Stream,
     chance: f64,
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::sectors("[effects.head_stalls]\nper_hour = 600\nseconds = [0.5, 3]\n"));
         assert!(refusal("[effects.head_stalls]\n").contains("must not be zero"));
         assert!(refusal("[effects.head_stalls]\nper_hour = 1\nseconds = [3, 2]\n").contains("[least, most]"));

@@ -147,7 +147,7 @@ mod tests {
             force.chunk_by(|a, b| felt(a) == felt(b)).filter(|run| felt(&run[0])).collect();
         let (spans, chance) = (640.0, 400.0 / 3600.0);
         let n = bumps.len() as f64;
-        // Two overlapping bumps are found as a single bump.
+        // Two overlapping bumps are counted as a single bump.
         assert!((n - spans * chance).abs() < 5.0 * math::sqrt(spans * chance), "{n}");
         let mut single = 0;
         for bump in &bumps {
@@ -168,7 +168,7 @@ mod tests {
         assert!(single * 4 > bumps.len() * 3);
     }
 
-    /// Velocities of a seed's bumps in `spans` time spans.
+    /// Velocities gained in the bumps of `spans` time spans.
     fn bumps(spans: u64) -> Vec<Vec3<Sensor>> {
         let parameters = Parameters { chance: 0.5, speed_mps: [0.05, 0.2], seconds: 0.3 };
         let bumps = ImuBumps { parameters, stream: Stream::new(5, "imu_bumps", "vehicle") };
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn units_on_one_vehicle_feel_the_same_bumps() {
+    fn inertial_units_on_one_vehicle_feel_the_same_bumps() {
         let felt = |unit: &'static str| {
             let force = |keys: &str| {
                 let samples = Bench::turning(keys).with_unit(unit).run::<Inertia>(unit);
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.imu_bumps]\n").contains("per_hour: must not be zero"));
         assert!(refusal("[effects.imu_bumps]\nper_hour = 9\nspeed_mps = 1\n").contains("must be"));

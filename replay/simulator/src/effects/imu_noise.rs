@@ -1,4 +1,4 @@
-//! Noise of inertial units.
+//! White noise of inertial units.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -17,7 +17,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Blocks of random numbers. Each vector takes two blocks.
+/// Numbers of the first block of random numbers for each quantity. Each vector takes two blocks.
 const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn attitudes_scatter_about_each_axis() {
+    fn attitude_noise_has_the_given_strength_about_each_axis() {
         let (plain, noisy) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let mut squares = [0.0; 3];
         for (plain, noisy) in plain.iter().zip(&noisy) {
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_zero_noise_is_refused() {
+    fn time_slice_length_changes_nothing_and_zero_noise_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.imu_noise]\n").contains("or accel_mps2_rthz or attitude_deg must not be"));
     }

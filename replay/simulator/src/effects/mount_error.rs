@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_zero_error_is_refused() {
+    fn time_slice_length_changes_nothing_and_zero_error_is_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.mount_error]\nangles_sd_deg = 2");
         let refusal = Dive::with_head().refusal("[effects.mount_error]");
         assert!(refusal.contains("or angles_sd_deg must not be zero"), "{refusal}");

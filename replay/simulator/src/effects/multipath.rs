@@ -147,7 +147,7 @@ mod tests {
                 [to_side, to_side + 2.0 * half_width_m / dy.abs(), to_flat, to_flat + height_m / dz.abs()];
             crossings.sort_by(f64::total_cmp);
             let along_m = crossings[1];
-            // The second point of reflection, folded back into the room.
+            // The second point at which the wall reflects the beam, folded back into the room.
             let fold = |at: f64, period: f64| {
                 let at = math::wrap(at, 2.0 * period);
                 if at > period { 2.0 * period - at } else { at }
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.multipath]\nshare = 0.5");
     }
 

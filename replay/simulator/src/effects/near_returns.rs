@@ -141,7 +141,7 @@ mod tests {
 
     /// The pings of a run share one range, with the given spread. The next run has another range.
     #[test]
-    fn clusters_have_the_given_share_run_length_and_spread() {
+    fn near_return_clusters_have_the_given_share_run_length_and_spread() {
         let (share, mean) = (0.1, 6.0);
         let near = near("share = 0.1\nmean_run = 6\nnear_m = 0.8\nfar_m = 2\nspread_m = 0.05");
         let runs: Vec<Vec<f64>> = near
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.near_returns]\nshare = 0.3\nmean_run = 9");
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.near_returns]\n{keys}"));
         assert!(refusal("").contains("share: must be above zero"));

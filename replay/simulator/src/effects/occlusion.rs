@@ -47,7 +47,7 @@ struct Occlusion {
 pub(super) struct Stopped(Vec<bool>);
 
 impl Stopped {
-    /// Whether a sample's beam is stopped; false for a sonar without this effect.
+    /// Whether a part of the vehicle stops the beam of a sample; false for a sonar without this effect.
     pub(super) fn has(stopped: Option<&Self>, sample: usize) -> bool {
         stopped.and_then(|stopped| stopped.0.get(sample)).copied().unwrap_or(false)
     }
@@ -122,7 +122,7 @@ impl Parameters {
 }
 
 impl Occlusion {
-    /// Range of the first obstacle on a beam, m.
+    /// Range of the first obstacle that a beam meets, m.
     fn range_m(&self, mount: &Mount, direction: Vec3<Body>) -> Option<f64> {
         let entered =
             self.obstacles.iter().filter_map(|obstacle| obstacle.enters_m(mount.position, direction));
@@ -171,7 +171,7 @@ mod tests {
             // The neighbour is to the right of the head, at 270 degrees.
             let off_rad = math::wrap_signed(angle_rad - 1.5 * math::PI, math::TAU);
             if off_rad.abs() < half_rad {
-                // Nearest point on a circle of this radius, whose centre is 0.3 m away.
+                // Range at which the beam meets a circle of this radius, whose centre is 0.3 m away.
                 let across_m = 0.3 * math::sin(off_rad);
                 let depth_m = math::sqrt(radius_m * radius_m - across_m * across_m);
                 let near_m = 0.3 * math::cos(off_rad) - depth_m;
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         side_by_side().assert_slices_dont_matter("[effects.occlusion]");
     }
 

@@ -1,4 +1,4 @@
-//! Speed of sound that changes with height.
+//! Speed of sound that changes with height in the tunnel.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -28,14 +28,14 @@ use crate::stages::Stage;
 /// in a constant gradient).
 pub(super) struct SoundSpeedProfileKind;
 
-/// Relative differences of speed below this count as zero.
+/// Relative differences between speeds of sound below this count as zero.
 const SAME: f64 = 1e-9;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
     floor_mps: f64,
     per_metre_mps: f64,
-    /// The vehicle file's speed of sound, m/s.
+    /// Speed of sound in the vehicle file, m/s.
     assumed_mps: f64,
 }
 
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
         let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
         assert!(refusal.contains("or per_metre_mps is needed"), "{refusal}");

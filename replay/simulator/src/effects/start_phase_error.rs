@@ -1,4 +1,4 @@
-//! Errors of the heads' start phases.
+//! Errors of the phases at which heads start to turn.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};

@@ -1,4 +1,4 @@
-//! Slack of the cable that varies.
+//! Slack of the cable that varies during the dive.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -30,7 +30,7 @@ pub(super) struct TetherSlackKind;
 
 #[derive(Debug, Clone)]
 struct Parameters {
-    /// Largest slack, m; 0 if the slack doesn't vary.
+    /// Largest slack of the cable, m; 0 if the slack doesn't vary.
     reach_m: f64,
     period_s: f64,
     swings: Vec<Swing>,
@@ -48,7 +48,7 @@ const PHASES: u64 = u64::MAX;
 #[derive(Component)]
 struct TetherSlack {
     slack: Knots,
-    /// Swings with their phases, radians.
+    /// Swings of the cable with their phases, radians.
     swings: Vec<(Swing, f64)>,
 }
 
@@ -88,7 +88,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Reads a swing.
+/// Reads one of the tables `swings`.
 fn swing(table: Section<'_>) -> Result<Swing, ConfigError> {
     let needed = |key, allowed| table.number(key, allowed).and_then(|number| table.required(key, number));
     let swing =
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_other_sensors_are_refused() {
+    fn time_slice_length_changes_nothing_and_other_sensors_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_slack]\n"));
         same_in_any_slices(&Bench::turning(
             "[effects.tether_slack]\nreach_m = 0.1\nswings = [{ reach_m = 0.1, period_s = 7 }]\n",

@@ -19,12 +19,12 @@ use crate::mesh::{self, Mesh, Role};
 
 /// Allowed chainage of the origin of a mesh, m. The origin of a survey may be far away.
 const CHAINAGE_M: core::ops::RangeInclusive<f64> = -1.0e5..=1.0e5;
-/// Allowed position of the origin across the tunnel, m.
+/// Allowed position of the origin of a mesh across the tunnel, m.
 const ACROSS_M: core::ops::RangeInclusive<f64> = -1000.0..=1000.0;
-/// Minimum length of a wall, m.
+/// Minimum length of a mesh that is a stretch of wall, m.
 const SHORTEST_M: f64 = 0.01;
 
-/// Position of the origin of a mesh.
+/// Position of the origin of a mesh in the tunnel.
 struct Place {
     chainage_m: f64,
     across_m: Yz,
@@ -173,7 +173,7 @@ impl Place {
     }
 }
 
-/// Loads the mesh in the `file` of a table.
+/// Loads the mesh from the file that the key `file` of a table names.
 fn read(table: &Section<'_>, role: Role, load: FileLoader<'_>) -> Result<Mesh, ConfigError> {
     let name = table.required("file", table.text("file")?)?;
     let refuse = |why: &str| table.invalid("file", why);
@@ -185,7 +185,7 @@ fn read(table: &Section<'_>, role: Role, load: FileLoader<'_>) -> Result<Mesh, C
     Mesh::new(triangles, role).map_err(|error| refuse(&error.to_string()))
 }
 
-/// An error about the position of a mesh.
+/// Creates an error about the position of a mesh.
 fn misplaced(table: &Section<'_>, (from_m, to_m): (f64, f64), why: &str) -> ConfigError {
     let key = if table.keys().contains(&"chainage_m") { "chainage_m" } else { "file" };
     table.invalid(key, &format!("the mesh, from {from_m:.3} to {to_m:.3} m, {why}"))

@@ -26,12 +26,12 @@ use super::widths::half_width_m;
 const LEAST_STEP_M: f64 = 1e-4;
 /// Accuracy of the point where a ray meets the wall, m.
 const ROOT_M: f64 = 1e-11;
-/// Displacement above which the wall is attributed to the feature, m.
+/// Displacement above which a hit on the wall is attributed to the feature that displaced the wall, m.
 const FEATURE_M: f64 = 1e-3;
-/// Half the baseline of the differences that give the normal of a displaced wall, m.
+/// Half the distance between the points whose difference gives the normal of a displaced wall, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
-/// The wall along the whole tunnel.
+/// The tunnel's wall along the whole tunnel, except openings.
 #[derive(Debug, Clone)]
 pub(super) struct Tube {
     axis: Axis,
@@ -42,7 +42,7 @@ pub(super) struct Tube {
     bulges: Vec<Bulge>,
     /// Meshes that replace the wall. They overlap no bend, change of scale, bulge or other mesh.
     meshes: Vec<MeshWall>,
-    /// The stretches, without gaps, from -infinity to +infinity of chainage.
+    /// Stretches of the tunnel, without gaps, from -infinity to +infinity of chainage.
     stretches: Vec<Stretch>,
 }
 
@@ -51,29 +51,29 @@ pub(super) struct Tube {
 struct Stretch {
     from_m: f64,
     piece: Piece,
-    /// The planes at the ends; `None` for an end at infinity.
+    /// Planes across the tunnel at the stretch's ends; `None` for an end at infinity.
     ends: [Option<Station>; 2],
-    /// Scale at the start of the stretch, or of the whole stretch if the slope is zero.
+    /// Scale of the profile at the start of the stretch, or of the whole stretch if the slope is zero.
     scale: f64,
     scale_slope_pm: f64,
     /// Numbers of the bulges that extend into the stretch.
     bulges: Vec<usize>,
     /// Number of the mesh that is the wall of this stretch.
     mesh: Option<usize>,
-    /// Reciprocal of an upper bound on the gauge's slope, m.
+    /// Reciprocal of an upper bound on the slope of the gauge, m. It determines the length of steps along rays.
     step_m: f64,
 }
 
-/// Passage of a ray through the tube.
+/// Passage of a ray through the water in the tube.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Passage {
     /// Distance along the ray at which the ray leaves the tube or reaches the given limit, m.
     pub(super) t_m: f64,
-    /// Whether the passage ends at the wall.
+    /// Whether the ray's passage ends at the wall.
     pub(super) wall: bool,
-    /// The wall at the end, if known without further computation.
+    /// Face of the wall at the end of the passage, if known without further computation.
     pub(super) face: Option<Face>,
-    /// Chainages of the start and the end, m.
+    /// Chainages of the start and the end of the passage, m.
     pub(super) chainages_m: [f64; 2],
 }
 
@@ -145,12 +145,12 @@ impl Tube {
         self.mesh_over(from_m, to_m).map(|(_, mesh)| mesh.feature())
     }
 
-    /// The tunnel's axis.
+    /// The axis of the tunnel.
     pub(super) fn axis(&self) -> &Axis {
         &self.axis
     }
 
-    /// The profile before it is scaled or displaced.
+    /// The tunnel's profile before it is scaled or displaced.
     pub(super) fn profile(&self) -> &Profile {
         &self.profile
     }
@@ -161,7 +161,7 @@ impl Tube {
         half_width_m(&self.profile) * self.scales.largest() + outwards_m
     }
 
-    /// Scale of the profile at `chainage_m`.
+    /// Scale of the tunnel's profile at `chainage_m`.
     pub(super) fn scale(&self, chainage_m: f64) -> f64 {
         self.scales.at(chainage_m)
     }
@@ -199,7 +199,7 @@ impl Tube {
         Some(hit.range_m)
     }
 
-    /// Whether `point` is in the tube.
+    /// Whether `point` is in the tube, which is bounded by the tunnel's wall.
     pub(super) fn contains(&self, point: V3) -> bool {
         let (number, _) = self.locate(point);
         self.stretches.get(number).is_some_and(|stretch| self.holds(stretch, point))
@@ -236,7 +236,7 @@ impl Tube {
         None
     }
 
-    /// The wall's face at a point of the wall.
+    /// The wall's face (normal and feature) at a point of the wall.
     pub(super) fn face(&self, point: V3) -> Face {
         let (number, chainage_m) = self.locate(point);
         let wall = Face { normal: [0.0; 3], feature: None };
@@ -307,7 +307,7 @@ impl Tube {
         if self.holds(to, ray.at(t_m)) {
             return None;
         }
-        // The axis is straight at a mesh.
+        // The tunnel's axis is straight at a mesh.
         let [tx, ty] =
             if to.mesh.is_some() { to.piece.station(to.from_m) } else { from.piece.station(from.from_m) }
                 .tangent;
@@ -404,7 +404,7 @@ impl Tube {
         unit(fall)
     }
 
-    /// Number of the feature that displaces the wall most.
+    /// Number of the feature that displaces the wall most at a point.
     fn displaced_by(&self, stretch: &Stretch, chainage_m: f64, arc_m: f64) -> Option<u16> {
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
@@ -416,12 +416,12 @@ impl Tube {
 }
 
 impl Stretch {
-    /// Whether all sections of the stretch are equal.
+    /// Whether all cross-sections of the stretch are equal.
     fn is_constant(&self) -> bool {
         self.scale_slope_pm == 0.0 && self.bulges.is_empty()
     }
 
-    /// Whether the stretch is a prism: straight, with equal sections.
+    /// Whether the stretch is a prism: straight, with equal cross-sections.
     fn is_plain(&self) -> bool {
         self.is_constant() && self.piece.curvature_pm() == 0.0
     }
@@ -437,7 +437,8 @@ impl Stretch {
         self.piece.chart([point[0], point[1]]).0
     }
 
-    /// Distance along the ray to the plane at the end ahead, m; infinity if the ray never passes the plane.
+    /// Distance along the ray to the plane at the end of the stretch ahead, m; infinity if the ray never passes the
+    /// plane.
     fn end_m(&self, ray: &Ray, forwards: bool) -> f64 {
         let Some(end) = self.ends[usize::from(forwards)] else { return f64::INFINITY };
         let [tx, ty] = end.tangent;

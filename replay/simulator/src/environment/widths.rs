@@ -1,4 +1,4 @@
-//! Width of a profile.
+//! Width of a tunnel profile.
 
 use headrace_geometry::tunnel::Profile;
 

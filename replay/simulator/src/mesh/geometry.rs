@@ -27,7 +27,7 @@ pub(super) enum Crossing {
 pub(super) struct Ray {
     origin: [f64; 3],
     inverse: [f64; 3],
-    /// Numbers of the axes. The axis nearest to the ray's direction is last.
+    /// Numbers of the coordinate axes. The axis nearest to the ray's direction is last.
     axes: [usize; 3],
     /// Shear that maps the ray onto the last axis: amounts subtracted from the first two coordinates per unit of the
     /// last, and the scale of the last coordinate.

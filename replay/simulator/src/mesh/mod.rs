@@ -49,7 +49,7 @@ const WAYS_OUT: [[f64; 3]; 6] = [
 /// The point where a ray hits a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshHit {
-    /// Distance from the ray's origin, metres.
+    /// Distance from the ray's origin to the hit, metres.
     pub range_m: f64,
     /// Unit normal of the face, on the side from which the ray comes.
     pub normal: [f64; 3],
@@ -124,7 +124,7 @@ impl Mesh {
     /// parts counts as outside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         let (low, high) = self.bounds();
-        // The negated comparison places NaN outside.
+        // The negated comparison counts a point with NaN as outside.
         if !(0..3).all(|k| point[k] >= low[k] && point[k] <= high[k]) {
             return false;
         }

@@ -1,4 +1,4 @@
-//! Rays, inside tests and checks of generated meshes.
+//! Tests with generated meshes: rays, inside tests and checks.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// A number in [-1, 1).
+    /// The next pseudo-random number in [-1, 1).
     fn signed(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
@@ -283,7 +283,7 @@ fn lowest_face_number_wins_at_equal_ranges() {
     let hit = |t: &Triangles, direction| {
         Mesh::new(t.clone(), Role::Body).unwrap().cast([0.0; 3], direction, 9.0).unwrap()
     };
-    // The diagonals of the faces cross in the middle.
+    // The faces' diagonals, which are edges of triangles, cross in the middle.
     let along_x = hit(&triangles, [1.0, 0.0, 0.0]);
     assert_eq!(along_x, MeshHit { range_m: 1.0, normal: [-1.0, 0.0, 0.0], face: 2 });
     assert_eq!(hit(&triangles, [0.0, 0.0, -1.0]).face, 8);

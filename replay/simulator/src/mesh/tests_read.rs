@@ -99,7 +99,7 @@ fn refused(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn text_file_faults_are_described() {
+fn faults_in_text_ply_files_are_described() {
     let good = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement \
                 face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     assert!(read(good.as_bytes()).is_ok());
@@ -137,7 +137,7 @@ fn text_file_faults_are_described() {
 }
 
 #[test]
-fn binary_file_faults_are_described() {
+fn faults_in_binary_ply_files_are_described() {
     let binary = ply(&sample(), "binary_big_endian");
     let faces = binary.len() - 80 * 17;
     let words = refused(&binary[..faces + 3]);
@@ -156,7 +156,7 @@ fn binary_file_faults_are_described() {
 }
 
 #[test]
-fn wrong_counts_allocate_no_memory() {
+fn wrong_element_counts_in_ply_files_allocate_no_memory() {
     let file = |vertices: u64, list: &str| {
         format!(
             "ply\nformat binary_little_endian 1.0\nelement nothing {vertices}\nelement vertex {vertices}\nproperty float \
@@ -173,7 +173,7 @@ fn wrong_counts_allocate_no_memory() {
     long_list.extend([0xFF; 4]);
     let words = refused(&long_list);
     assert!(words.contains("end of file") && words.contains("'face'"), "{words}");
-    // A truncated file in text encoding.
+    // A file in text encoding that is cut off.
     let text = file(u64::MAX, "uint").replace("binary_little_endian", "ascii");
     assert!(refused(text.as_bytes()).contains("end of file"));
 }

@@ -21,7 +21,7 @@ pub use legs::Leg;
 pub(crate) use parse::parse;
 pub use place::{Ground, Place};
 
-/// A trajectory from the dive's start to its end.
+/// A trajectory of the vehicle from the dive's start to its end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     base: Base,
@@ -44,12 +44,12 @@ impl Trajectory {
         Self { duration_s: legs.duration_s(), base: Base::Legs(legs), sways: Vec::new() }
     }
 
-    /// Creates a smooth trajectory along knots for `duration_s`.
+    /// Creates a smooth trajectory through knots, with duration `duration_s`.
     pub fn of_knots(knots: Knots, duration_s: f64) -> Self {
         Self { base: Base::Knots(knots), sways: Vec::new(), duration_s }
     }
 
-    /// Creates a pilot's trajectory.
+    /// Creates the trajectory of a pilot who gets no advice.
     fn piloted(piloted: Piloted) -> Self {
         Self { duration_s: piloted.duration_s(), base: Base::Piloted(Box::new(piloted)), sways: Vec::new() }
     }

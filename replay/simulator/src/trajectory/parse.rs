@@ -1,4 +1,4 @@
-//! Reads the `[trajectory]` table.
+//! Reads the `[trajectory]` table of a scene.
 
 use std::ops::RangeInclusive;
 
@@ -21,7 +21,7 @@ const SPEED_MPS: RangeInclusive<f64> = 0.001..=5.0;
 const DEGREES: RangeInclusive<f64> = -80.0..=80.0;
 const REACH_M: RangeInclusive<f64> = 0.0..=100.0;
 const REACH_DEG: RangeInclusive<f64> = 0.0..=80.0;
-/// Name of the random streams of trajectories.
+/// Name under which trajectories draw random numbers.
 const NAME: &str = "trajectory";
 
 #[derive(Debug, Clone, Copy)]

@@ -90,7 +90,7 @@ fn pilot_reaches_the_end_within_bounds_in_both_directions() {
                 back += usize::from(gone_m < -0.02);
             }
             for Place { chainage_m, across_m: [y, z], turned_rad: [roll, pitch, yaw] } in &steps {
-                // A pilot who goes back stops at the start.
+                // A pilot who goes back doesn't pass the dive's start by more than a metre.
                 let inside = (from_m.min(to_m) - 1.0..=from_m.max(to_m) + 1.0).contains(chainage_m);
                 assert!(inside && y.abs() <= 0.5 && (z - 5.0).abs() <= 0.3, "{seed}: {chainage_m} {y} {z}");
                 assert!(yaw.to_degrees().abs() <= 8.0 && roll.abs() + pitch.abs() == 0.0);
@@ -121,7 +121,7 @@ fn pilot_goes_back_the_given_distance() {
 }
 
 #[test]
-fn pilot_depends_only_on_the_seed() {
+fn pilot_trajectory_depends_only_on_the_seed() {
     let at = |seed| parsed(&format!("{PILOT}to_m = 60\n"), seed).unwrap().0;
     assert_eq!(at(4), at(4));
     assert_ne!(at(4), at(5));

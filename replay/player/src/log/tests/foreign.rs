@@ -61,7 +61,7 @@ fn check(bytes: &[u8], what: &str) -> Vec<Loss> {
     reader.losses().to_vec()
 }
 
-/// Returns all combinations of write options, with names.
+/// Returns all combinations of the MCAP writer's options, with names.
 fn all_options() -> Vec<(String, WriteOptions)> {
     let mut all = Vec::new();
     for (name, compression) in
@@ -247,7 +247,7 @@ fn messages_of_an_undefined_channel_are_counted() {
 }
 
 #[test]
-fn chunks_with_wrong_times_give_late_messages() {
+fn messages_of_chunks_with_wrong_times_are_counted_as_late() {
     let mut bytes = write(WriteOptions::new().compression(None).chunk_size(Some(200)));
     for (number, at) in places(&bytes, op::CHUNK).into_iter().enumerate() {
         let later = (1_000_000 * (number as u64 + 1)).to_le_bytes();
@@ -338,7 +338,7 @@ fn with_attachment(name: &str) -> (Vec<u8>, usize) {
 }
 
 #[test]
-fn unreadable_attachment_is_missing_and_reported() {
+fn unreadable_attachment_is_left_out_and_reported() {
     let (whole, at) = with_attachment("notes.txt");
     assert_eq!(read(&whole).1, vec![]);
     // The data's length comes after the opcode and the record length, two timestamps, and the name and the media type,

@@ -28,7 +28,7 @@ impl Write for SlowMedium {
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        // The receiver may have been dropped.
+        // The test may have dropped the receiver already.
         self.done.try_send(self.bytes.clone()).ok();
         Ok(())
     }
@@ -171,7 +171,7 @@ fn dropped_recorder_handle_completes_the_file() {
     assert_eq!((seen.len(), losses), (1, vec![]));
 }
 
-/// A medium with limited space.
+/// A medium that accepts only a limited number of bytes.
 struct SmallMedium(Arc<AtomicUsize>);
 
 impl Write for SmallMedium {
@@ -359,7 +359,7 @@ fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
 }
 
 #[test]
-fn packets_dropped_by_lines_are_recorded_per_source_every_few_seconds() {
+fn packets_dropped_by_connections_are_recorded_per_source_every_few_seconds() {
     let s = Duration::from_secs;
     let words = |packets: u64, id: &str, from: u64, to: u64| {
         format!(
@@ -383,7 +383,7 @@ fn packets_dropped_by_lines_are_recorded_per_source_every_few_seconds() {
 /// Every dropped packet is counted while the recorder is too slow, but the source of some dropped packets is then
 /// unknown.
 #[test]
-fn drops_beyond_the_queue_capacity_are_counted() {
+fn dropped_packets_beyond_the_queue_capacity_are_counted() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     port.tick(1, MonoNs(1), &[]).unwrap();

@@ -21,7 +21,7 @@ use super::super::{
 use super::parts::{Folder, all};
 use super::*;
 
-/// An operation on the storage.
+/// An operation on the storage, which the test may let fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Op {
     Create,
@@ -221,7 +221,7 @@ fn storage_fault_that_occurs_once_loses_nothing_and_is_recorded() {
             let told: Vec<String> = losses.iter().map(ToString::to_string).collect();
             let is_told = told.iter().any(|told| told.contains(&fault.words()));
             assert!(is_told || fault.continued.is_none(), "{which}: {told:?}");
-            // The failed part must have no end.
+            // The part in which the fault occurred must have no end record.
             let (_, alone) = read(&std::fs::read(&fault.path).unwrap());
             let is_cut = |loss: &Loss| matches!(loss.kind, LossKind::Truncated | LossKind::Framing);
             // A part without synced content was removed, and created again under the same name.

@@ -65,7 +65,7 @@ fn mean_range_is_averaged_over_the_disc_of_the_cone() {
 }
 
 #[test]
-fn single_ray_equals_the_base_ray_bit_for_bit() {
+fn beam_cone_of_one_ray_equals_the_ideal_beam_bit_for_bit() {
     let dive = Dive::with_head();
     let base = dive.dive("");
     for effects in ["[effects.beam_cone]\nrays = 1", "[effects.beam_cone]\nrays = 1\nform = \"mean\""] {
@@ -74,7 +74,7 @@ fn single_ray_equals_the_base_ray_bit_for_bit() {
 }
 
 #[test]
-fn beam_cone_keeps_the_true_axis_point_and_perpendicular_ranges() {
+fn beam_cone_leaves_the_true_axis_point_and_perpendicular_ranges_unchanged() {
     let dive = Dive::with_head();
     let (base, first, bilinear) = (
         dive.dive(""),
@@ -106,14 +106,14 @@ fn small_object_gives_the_first_echo_but_not_the_strongest() {
 }
 
 #[test]
-fn beam_width_follows_frequency() {
+fn beam_width_of_a_head_follows_its_frequency() {
     for (khz, deg) in [(600.0, 2.4), (800.0, 1.9), (1000.0, 1.4)] {
         assert!((width_at_deg(khz) - deg).abs() < 1e-12);
     }
 }
 
 #[test]
-fn slice_length_does_not_change_results() {
+fn time_slice_length_does_not_change_results() {
     Dive::with_head().assert_slices_dont_matter("[effects.beam_cone]\nform = \"bilinear\"\nrays = 8");
 }
 

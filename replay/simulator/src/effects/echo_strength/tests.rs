@@ -113,7 +113,7 @@ fn detected_share_matches_the_sonar_equation() {
 
 /// The vehicle's own parts are detected even if no wall is detected.
 #[test]
-fn parts_of_the_vehicle_are_always_detected() {
+fn echoes_of_vehicle_parts_are_always_detected() {
     let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";
     let dive = Dive { vehicle: hull, ..Dive::with_head() };
     let plain = dive.dive("[effects.occlusion]").ranges_m(0);
@@ -128,7 +128,7 @@ fn parts_of_the_vehicle_are_always_detected() {
 }
 
 #[test]
-fn absorption_follows_water_temperature() {
+fn sound_absorption_follows_water_temperature() {
     let head = Dive::with_head().scene("").unwrap().facts.sensors[0].head.unwrap();
     for temperature_degc in [4.0, 25.0] {
         let parameters = Parameters {
@@ -156,7 +156,7 @@ fn head_with_usual_settings_detects_surrounding_rock() {
 }
 
 #[test]
-fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
     Dive::with_head().assert_slices_dont_matter("[effects.echo_strength]\nwall_db = -20\ngain_db = 0");
     let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.echo_strength]\n{keys}"));
     assert!(refusal("frequency_khz = 100").contains("from 600 to 1000"));

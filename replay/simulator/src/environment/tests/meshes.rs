@@ -78,7 +78,7 @@ fn to_circle(radius_m: f64, origin: V3, direction: V3) -> f64 {
     (-b + math::sqrt(b * b - a * c)) / a
 }
 
-/// Cosine of the incidence.
+/// Cosine of the ray's incidence on the surface it hits.
 fn facing(hit: &Hit, direction: V3) -> f64 {
     -vector::dot([hit.normal.x(), hit.normal.y(), hit.normal.z()], direction)
 }
@@ -98,7 +98,7 @@ fn mesh_of_the_profile_gives_equal_ranges() {
     for _ in 0..20_000 {
         let origin = place_in(&mut lcg, within_m, [35.0, 55.0]);
         let mut direction = lcg.direction();
-        // Every third ray is nearly along the tunnel.
+        // About every third ray is nearly along the tunnel.
         if lcg.between(0.0, 3.0) < 1.0 {
             let (y, z) = (lcg.between(-0.3, 0.3), lcg.between(-0.3, 0.3));
             direction = [math::sqrt(1.0 - y * y - z * z) * direction[0].signum(), y, z];

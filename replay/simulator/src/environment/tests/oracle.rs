@@ -3,12 +3,12 @@
 
 use super::*;
 
-/// Length of a step along a ray, m.
+/// Length of the model's steps along a ray, m.
 const STEP_M: f64 = 2e-3;
-/// Length over which rays are followed, m.
+/// Length over which the model follows rays, m.
 pub(super) const FAR_M: f64 = 20.0;
 
-/// A profile with a closed form for its wall.
+/// A tunnel profile with a closed form for its wall.
 #[derive(Clone, Copy)]
 pub(super) enum Shape {
     Circle(f64),
@@ -51,7 +51,7 @@ impl Shape {
 
     /// Distance from the reference point to the wall in a direction, and the arc length of that wall point.
     fn wall(self, [dy, dz]: [f64; 2]) -> (f64, f64) {
-        // Angle from straight down, growing to the left.
+        // Angle of a direction from straight down, growing to the left.
         let angle = math::wrap(math::atan2(dy, -dz), math::TAU);
         match self {
             Self::Circle(radius) => (radius, radius * angle),
@@ -141,7 +141,7 @@ impl Oracle {
         [s, (p[1] - at[1]) * math::cos(heading) - (p[0] - at[0]) * math::sin(heading), p[2]]
     }
 
-    /// Chainage and y of a point, without an estimate.
+    /// Chainage and y of a point, searched without an estimate.
     pub(super) fn search(&self, p: V3) -> V3 {
         let distance = |s: &f64| {
             let (at, _) = self.station(*s);

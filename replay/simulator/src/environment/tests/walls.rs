@@ -6,7 +6,7 @@ use super::*;
 const CERAN: Shape = Shape::Trimmed(6.05, 10.4);
 
 #[test]
-fn plain_tunnel_equals_the_profile_bit_for_bit() {
+fn ranges_in_a_plain_tunnel_equal_those_of_its_profile_bit_for_bit() {
     let profile = shapes::ceran().unwrap();
     let far_feature = "[tunnel]\n[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = 90\nsize_m = 1";
     let bare = Environment::straight(profile.clone());
@@ -80,7 +80,7 @@ fn bulges_displace_the_wall() {
 }
 
 #[test]
-fn thin_bulge_is_not_skipped() {
+fn rays_do_not_skip_a_thin_bulge() {
     let environment = parse(&bulge(&[10.0, 0.02, 0.0, 0.02, 0.02]), &shapes::ceran().unwrap());
     let centre = environment.design.reference();
     let hit = cast(&environment, [10.0, centre[0], centre[1]], [0.0, 0.0, -1.0]).unwrap();
