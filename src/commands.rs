@@ -235,7 +235,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     Ok(if differs { failure::FAILED } else { code })
 }
 
-/// Files that a player plays.
+/// Files that the replay reads.
 fn files_of_player(player: &Player) -> Vec<PathBuf> {
     player.files().iter().map(|file| file.path.clone()).collect()
 }

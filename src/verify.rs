@@ -124,7 +124,7 @@ fn text(difference: &Difference, sources: &[SourceInfo]) -> String {
     }
 }
 
-/// A value as text. For a float, the text includes its bits.
+/// A result's value as text. For a float, the text includes its bits.
 fn value(word: WordKind, bits: u64) -> String {
     match word {
         WordKind::Integer => format!("{bits}"),

@@ -19,7 +19,7 @@ use crate::vehicle_file;
 use cable::Cable;
 use outlook::Outlook;
 
-/// A finding, with its file and line.
+/// An error or warning, with its file and line.
 struct Found {
     grade: Grade,
     file: String,

@@ -31,8 +31,8 @@ use anonymous::Anonymous;
 
 /// Tick length of the replay that finds the vehicle's chainage over time.
 const TICK: DurNs = DurNs::from_millis(20);
-/// Longest gap that is kept in the log. During a gap the vehicle is outside the range of chainage, or has no
-/// fix.
+/// Longest gap that the trimmed log keeps. During a gap the vehicle is outside the range of chainage, or has
+/// no fix.
 const BRIDGED: DurNs = DurNs::from_millis(2000);
 
 /// `headrace trim`.
@@ -56,12 +56,12 @@ pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     Ok(if trimmed.losses > 0 { failure::DATA_LOST } else { failure::OK })
 }
 
-/// Whether the options need the vehicle.
+/// Whether the options need a vehicle file.
 fn needs_vehicle(args: &Trim) -> bool {
     args.chainage.is_some() || args.drop_echoes || args.anonymise
 }
 
-/// The vehicle; `None` if the options don't need it.
+/// The vehicle given or attached to the log; `None` if the options don't need it.
 fn vehicle(
     args: &Trim,
     given: Given,

@@ -29,8 +29,8 @@ fn wrong(seed: u64) -> [Wrong; 2] {
     ]
 }
 
-/// Angles, relative positions and senses of rotation are correct within three of the stated standard
-/// deviations.
+/// Estimated angles, relative positions and senses of rotation of heads are correct within three of the
+/// stated standard deviations.
 ///
 /// The standard deviations are as small as a survey needs.
 #[test]

@@ -1,4 +1,4 @@
-//! Checks which quantities are refused, and the reasons.
+//! Checks which quantities the calibration refuses to estimate, and the reasons that it gives.
 
 use super::super::estimate::NotEstimated;
 use super::super::heads::heads;
