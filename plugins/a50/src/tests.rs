@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated device.
+//! Tests of the way from a vehicle file's table to readings, through the emulated device.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;

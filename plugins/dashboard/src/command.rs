@@ -61,7 +61,7 @@ pub(crate) enum Request {
 pub enum Command {
     /// Acknowledges an alert; 0 acknowledges all alerts that need an acknowledgement.
     Acknowledge {
-        /// Number of the alert.
+        /// Number of the alert; 0 means all.
         alert: u32,
         /// Name of the sender, at most 16 bytes.
         by: String,

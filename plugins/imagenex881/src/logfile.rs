@@ -19,10 +19,10 @@ pub struct LogFile<'a> {
     offset: usize,
 }
 
-/// One shot: a header and a return.
+/// One shot of a log file: a header and a return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shot<'a> {
-    /// Three-letter model name.
+    /// Three-letter model name of the device.
     pub model: [u8; 3],
     /// Day, month (1 to 12) and year; `None` if the field isn't a date.
     pub date: Option<(u8, u8, u16)>,
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn real_sounder_log_is_read() {
-        // Number of shots, and of shots with an echo.
+        // Number of shots in the file, and number of shots with an echo.
         let counts = [(300, 203), (917, 452)];
         let name = "imagenex852_cidco/19_26_51-2016_11_18-sonar.852";
         for (path, (shots, echoes)) in headrace_support::recordings::both(name, counts[0], counts[1]) {

@@ -128,7 +128,7 @@ fn all_finite<const N: usize>(values: [f64; N]) -> Option<[f64; N]> {
     values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
-/// Value of a 32-bit device clock.
+/// Value of a device's 32-bit clock after this time.
 fn wrapped(ticks: i64) -> u32 {
     u32::try_from(ticks.rem_euclid(1 << 32)).unwrap_or_default()
 }

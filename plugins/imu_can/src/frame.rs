@@ -8,7 +8,7 @@
 //! ```
 //! Source: linux/can.h.
 
-/// Length of a frame in the log.
+/// Length of a CAN frame in the log, bytes.
 pub const FRAME_BYTES: usize = 16;
 
 const MAX_DATA_BYTES: u8 = 8;
@@ -18,12 +18,12 @@ const ERROR: u32 = 1 << 29;
 const STANDARD_IDS: u16 = 0x7FF;
 const EXTENDED_IDS: u32 = 0x1FFF_FFFF;
 
-/// An arbitration identifier.
+/// The arbitration identifier of a CAN frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CanId {
-    /// 11 bits.
+    /// Standard identifier of 11 bits.
     Standard(u16),
-    /// 29 bits.
+    /// Extended identifier of 29 bits.
     Extended(u32),
 }
 
@@ -60,7 +60,7 @@ pub enum FrameError {
     Id(u32),
 }
 
-/// A payload of up to eight bytes, built piece by piece.
+/// Data of a frame, up to eight bytes, built piece by piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Payload {
     len: u8,

@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated unit.
+//! Tests of the way from a vehicle file's table to readings, through the emulated unit.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;
@@ -96,7 +96,7 @@ fn readings(decoder: &mut ImuDecoder, set: MessageSet, messages: &[Message]) -> 
     readings
 }
 
-/// Readings from `samples` samples of the emulated unit, whose motion is `truth`.
+/// Readings decoded from `samples` samples of the emulated unit, whose motion is `truth`.
 fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) -> Vec<Decoded> {
     let start = MonoNs(2_000_000_000);
     let setup = EmulatorSetup { start, head: None, site: Site::default(), polled: true };
@@ -120,7 +120,7 @@ fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) 
     readings
 }
 
-/// Compares every reading with the truth. The tolerances of rate and force are one quantum each.
+/// Compares every reading with the unit's true motion. The tolerances of rate and force are one quantum each.
 fn check(readings: &[Decoded], truth: &Going, rate_quantum: f64, force_quantum: f64) {
     for decoded in readings {
         let felt = truth.felt(Inertia::due(decoded.valid_at, DurNs::ZERO));

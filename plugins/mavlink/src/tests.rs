@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated autopilot.
+//! Tests of the way from a vehicle file's table to readings, through the emulated autopilot.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::codec::CodecCounts;
@@ -75,7 +75,7 @@ fn decode_message(decoder: &mut MavlinkDecoder, message: &Message) -> Vec<Readin
     readings.into_iter().map(|decoded| decoded.reading).collect()
 }
 
-/// Readings of one part of the vehicle, sent by the emulated autopilot. `feel` fills in the measurements.
+/// Readings of one sensor, sent by the emulated autopilot. `feel` fills in the measurements.
 fn emulated<M: Measurement>(
     emulator: &mut dyn Emulator<M>,
     decoder: &mut MavlinkDecoder,

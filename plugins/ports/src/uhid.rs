@@ -120,7 +120,7 @@ fn create(identity: &Identity<'_>) -> Result<Vec<u8>, UhidError> {
     push_text(&mut event, "a serial number", identity.serial, SERIAL_BYTES)?;
     event.extend(size.to_ne_bytes());
     event.extend(BUS_USB.to_ne_bytes());
-    // Version and country are zero.
+    // The fields version and country are zero.
     for word in [u32::from(identity.vendor_id), u32::from(identity.product_id), 0, 0] {
         event.extend(word.to_ne_bytes());
     }
@@ -175,7 +175,8 @@ mod tests {
         descriptor: &DESCRIPTOR,
     };
 
-    /// A kernel that records each write, and accepts at most a given number of bytes of each.
+    /// A stand-in for the kernel that records each write, and accepts at most a given number of bytes of
+    /// each.
     #[derive(Debug)]
     struct Events {
         taken: Vec<Vec<u8>>,

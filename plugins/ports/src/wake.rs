@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// Functions that park threads: those of the system, or those of a model.
 pub trait Threads {
-    /// Handle of a thread.
+    /// Handle by which a thread can be woken.
     type Thread: Clone;
 
     /// Returns a handle of this thread.

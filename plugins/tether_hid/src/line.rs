@@ -47,7 +47,7 @@ pub struct Stamp {
     pub millisecond: u16,
 }
 
-/// One line, in the units configured in the monitor.
+/// One line of a monitor, in the units configured in the monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineReading {
     /// Winch and time, which only LCI-90i lines have.
@@ -61,7 +61,7 @@ pub struct LineReading {
 }
 
 impl Decimal {
-    /// Zero.
+    /// The number zero.
     pub const ZERO: Self = Self { mantissa: 0, places: 0 };
 
     /// The number `mantissa` / 10^`places`; `None` if it doesn't fit eight characters.
@@ -89,7 +89,7 @@ impl Decimal {
         f64::from(self.mantissa) * self.quantum()
     }
 
-    /// Value of one unit in the last decimal place.
+    /// Value of one unit in the number's last decimal place.
     pub fn quantum(self) -> f64 {
         1.0 / POWERS_OF_TEN.get(usize::from(self.places)).copied().map_or(1.0, f64::from)
     }

@@ -26,20 +26,20 @@ pub const REFERENCE_DESCRIPTOR: [u8; 59] = [
 /// Number of bits of a counter that wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Width {
-    /// One byte.
+    /// A count of one byte.
     Bits8,
-    /// Two bytes.
+    /// A count of two bytes.
     Bits16,
-    /// Four bytes.
+    /// A count of four bytes.
     Bits32,
 }
 
-/// Byte order of a counter.
+/// Byte order of a counter's reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Endian {
-    /// Least significant first.
+    /// Least significant byte first.
     Little,
-    /// Most significant first.
+    /// Most significant byte first.
     Big,
 }
 
@@ -66,7 +66,7 @@ pub struct ReportLayout {
     pub auxiliary_offset: Option<usize>,
 }
 
-/// One report.
+/// One report of a HID counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Report {
     /// Sequence number, if the layout has one.
@@ -113,7 +113,7 @@ pub enum LayoutError {
 }
 
 impl Width {
-    /// Number of bits: 8, 16 or 32.
+    /// Number of bits of the count: 8, 16 or 32.
     pub fn bits(self) -> u32 {
         match self {
             Self::Bits8 => 8,

@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated counter.
+//! Tests of the way from a vehicle file's table to readings, through the emulated counter.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;

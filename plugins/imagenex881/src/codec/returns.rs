@@ -17,23 +17,23 @@ const MAX_ECHO: u16 = 500;
 const HEADER_BYTES: usize = 12;
 const TERMINATOR: u8 = 0xFC;
 const CLOCKWISE: u8 = 0x40;
-/// Smallest range setting whose counts are 1 cm.
+/// Smallest range setting at which a count of profile range is 1 cm, m.
 const COARSE_FROM_M: u8 = 5;
 
-/// Type of a return.
+/// Type of a return, which its tag states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tag {
     /// `IMX`: echo at the 25-point setting.
     Imx,
     /// `IGX`: echo at the 50-point setting.
     Igx,
-    /// GS model, with attitude sensors.
+    /// Return of a GS model, which has attitude sensors.
     Ipx,
-    /// GS model, with attitude sensors.
+    /// Return of a GS model, which has attitude sensors.
     Ina,
-    /// GS model, with attitude sensors.
+    /// Return of a GS model, which has attitude sensors.
     Inb,
-    /// GS model, with attitude sensors.
+    /// Return of a GS model, which has attitude sensors.
     Inc,
 }
 
@@ -52,7 +52,8 @@ impl Tag {
         }
     }
 
-    /// Whether the return is from a GS model. GS models add fields after the common header, known from one source only.
+    /// Whether the return is from a GS model. GS models add fields after the common header. Only one source
+    /// describes these fields.
     pub const fn is_gs(self) -> bool {
         matches!(self, Self::Ina | Self::Inb | Self::Inc)
     }
@@ -78,7 +79,7 @@ impl Model {
     }
 }
 
-/// The serial status byte.
+/// The serial status byte of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status(pub u8);
 
@@ -126,7 +127,7 @@ pub struct Return {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReturnError {
-    /// The tag is unknown.
+    /// The tag, the first three bytes of the return, is unknown.
     #[error("return: tag {got:02X?}; allowed are IMX, IGX, IPX, INA, INB, INC")]
     Tag {
         /// The three bytes received.
@@ -146,7 +147,7 @@ pub enum ReturnError {
         /// Bytes 5, 6 and 8 to 11 of the return.
         got: [u8; 6],
     },
-    /// A field above its maximum.
+    /// A field of the return is above its maximum.
     #[error("return: {field} is {got}; at most {max} is allowed")]
     TooGreat {
         /// Name of the field.

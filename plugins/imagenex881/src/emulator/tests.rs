@@ -8,10 +8,10 @@ use crate::plugin::HeadDecoder;
 use crate::settings::counts_of_rad;
 use crate::settings::tests::settings;
 
-/// Radius of the tube, m.
+/// Radius of the tube in which the head pings, m.
 const RADIUS_M: f64 = 4.0;
 
-/// Result of a run: send and receive times, ns, and the readings with their times.
+/// Result of an emulated run: send and receive times of messages, ns, and the readings with their times.
 struct Run {
     sent: Vec<u64>,
     received: Vec<u64>,
@@ -27,7 +27,7 @@ fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
     let mut run = Run { sent: Vec::new(), received: Vec::new(), readings: Vec::new() };
     let mut due = Vec::new();
     let last = start + DurNs(settings.ping_period.0 * (pings as i64 - 1));
-    // `begin` is called twice, and still gives each ping once.
+    // The emulator's `begin` is called twice, and still gives each ping once.
     emulator.begin(start + DurNs(settings.ping_period.0 / 2), &mut due);
     emulator.begin(last + DurNs(1), &mut due);
     for sounding in due {
@@ -53,7 +53,7 @@ fn turning(start_rad: f64, growing: bool) -> HeadProgram {
     HeadProgram { start_rad, growing, sector: None }
 }
 
-/// Sensor angles of the readings, in counts.
+/// Sensor angles of the readings, in counts of 0.3 degrees.
 fn counts(run: &Run) -> Vec<i32> {
     run.readings.iter().map(|(_, sonar)| counts_of_rad(sonar.angle_rad)).collect()
 }

@@ -1,4 +1,4 @@
-//! Worked examples of all makers' sets, and the codec contract for each set.
+//! Worked examples of all makers' message sets, and the codec contract for each set.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts};
 

@@ -26,7 +26,7 @@ const ANGLE_OFFSET_DEG: f64 = -250.0;
 const ACCELERATION_OFFSET_MPS2: f64 = -320.0;
 const LATENCY_QUANTUM_MS: f64 = 0.5;
 
-/// Filter by sender.
+/// Filter of frames by their sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Network {
     /// Source address of the unit; `None` if it is the only sender of these groups.
@@ -46,10 +46,10 @@ pub struct Slope {
     pub latency: u8,
 }
 
-/// Three values, in the maker's axis order.
+/// Three turn rates or accelerations, in the maker's axis order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Triple {
-    /// Values in wire order.
+    /// Values in the order of the frame.
     pub raw: [u16; 3],
     /// Figures of merit, two bits each from bit 0: 0 good, 1 degraded, 2 error, 3 not available.
     pub figures: u8,
@@ -57,14 +57,14 @@ pub struct Triple {
     pub latency: u8,
 }
 
-/// One message.
+/// One message of the J1939 set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
-    /// Group 61481.
+    /// Parameter group 61481: slope.
     Slope(Slope),
-    /// Group 61482.
+    /// Parameter group 61482: angular rate.
     AngularRate(Triple),
-    /// Group 61485.
+    /// Parameter group 61485: acceleration.
     Acceleration(Triple),
 }
 

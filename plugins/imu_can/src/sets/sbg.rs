@@ -42,7 +42,7 @@ impl ImuStatus {
     }
 }
 
-/// One message, in the device's axes.
+/// One message of the SBG set, in the device's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
     /// Header of an inertial sample.

@@ -22,7 +22,7 @@ pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1.0 / 256.0;
 /// Air pressure of one count, Pa.
 pub const PRESSURE_QUANTUM_PA: f64 = 1.0 / 32_768.0;
 
-/// Identifiers used by the device.
+/// CAN identifiers used by the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ids {
     /// Base of 29-bit identifiers, whose lowest byte is the code; `None` for the default 11-bit codes.
@@ -51,7 +51,7 @@ pub struct Utc {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StatusWord(pub u32);
 
-/// One message.
+/// One message of the Xsens set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
     /// Error code; 1 means that the device dropped messages.

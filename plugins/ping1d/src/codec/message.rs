@@ -169,7 +169,7 @@ macro_rules! messages {
             $($(#[$meta])* pub const $constant: u16 = $id;)*
             /// Refusal of a message.
             pub const NACK: u16 = 2;
-            /// Human-readable text.
+            /// Human-readable text from the device.
             pub const ASCII_TEXT: u16 = 3;
             /// Switches the device to its bootloader. Never sent.
             pub const GOTO_BOOTLOADER: u16 = 1100;
@@ -183,12 +183,12 @@ macro_rules! messages {
             $($(#[$meta])* $name($type),)*
             /// Refusal of the message with this id.
             Nack {
-                /// Id of the refused message.
+                /// Id of the message that the device refuses.
                 nacked_id: u16,
-                /// Reason.
+                /// Reason of the refusal, as text.
                 text: Text,
             },
-            /// Human-readable text.
+            /// Human-readable text from the device.
             AsciiText(Text),
             /// A ping with its echo strengths.
             Profile(Profile),

@@ -11,7 +11,7 @@ use headrace_sensor::driver::IgnoredSenders;
 /// Maximum number of bytes returned by one read.
 pub const READ_BYTES: usize = 2048;
 
-/// Senders on a line that accepts any sender. They are kept when the line is reopened.
+/// Accepted and rejected senders on a line that accepts any sender. They are kept when the line is reopened.
 #[derive(Default)]
 pub struct Senders {
     /// The accepted sender, which is taken to be the device.
@@ -20,7 +20,7 @@ pub struct Senders {
     pub strangers: IgnoredSenders,
 }
 
-/// Whether bytes contain a message of a device on the line.
+/// Function that checks whether bytes contain a message of a device on the line.
 pub type IsValid<'a> = &'a dyn Fn(&[u8]) -> bool;
 
 /// An open line.
@@ -105,7 +105,7 @@ pub(super) fn exchange_by_datagram(
 pub(super) struct ReadTimeout(Duration);
 
 impl ReadTimeout {
-    /// Sets the timeout of the next read.
+    /// Sets the timeout of the socket's next read.
     pub(super) fn set(
         &mut self,
         wait: Duration,
