@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     #[expect(clippy::disallowed_methods, reason = "any moment will do")]
-    fn requests_within_a_second_count_as_one() {
+    fn stop_requests_within_a_second_count_as_one() {
         let (begun, mut requests) = (Instant::now(), Requests::default());
         let is_second = [0, 1, 300, 999, 1000, 1500]
             .map(|at_ms| requests.is_second(begun + Duration::from_millis(at_ms)));

@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn event_is_one_line_without_control_codes_except_colours() {
+    fn log_event_is_one_line_without_control_codes_except_colours() {
         let text = "\x1b[33mWARN\x1b[0m opened a\nb\x1b[2J\x1b]0;t\x07\u{202e}\n";
         let line = "\x1b[33mWARN\x1b[0m opened a\\nb\\u001b[2J\\u001b]0;t\\u0007\\u202e\n";
         assert_eq!(event(text.as_bytes()), line);
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn log_variable_sets_the_levels_of_named_crates() {
+    fn rust_log_sets_the_levels_of_named_crates() {
         let shows = enabled(None, Some("headrace_ports=debug"));
         assert!(shows("headrace_ports::service", Level::DEBUG) && shows("headrace_replay", Level::WARN));
         assert!(!shows("headrace_replay", Level::INFO));
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_log_variable_is_named_and_ignored() {
+    fn invalid_rust_log_is_named_and_ignored() {
         let (filter, error) = filter(None, Some("headrace=loud"));
         assert!(error.unwrap().starts_with("RUST_LOG = \"headrace=loud\": "));
         assert!(

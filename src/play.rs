@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unknown_line_is_refused_with_the_list_of_commands() {
+    fn unknown_playback_command_is_refused_with_the_list_of_commands() {
         let command = |line| command(line, MonoNs(5));
         assert_eq!(command(" step 12 "), Ok(PlaybackCommand::Step(12)));
         assert_eq!(command("seek 10s"), Ok(PlaybackCommand::Seek(MonoNs(10_000_000_005))));

@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn column_shows_its_worst_section_and_the_clock_hours_that_all_its_sections_cover() {
+    fn wall_column_shows_its_worst_section_and_the_clock_hours_that_all_its_sections_cover() {
         let strip = wall(100, 2.0).strip(Extent::Tunnel, 50);
         assert_eq!((strip.columns.len(), strip.column_m), (50, 1.0));
         let first = strip.columns[0].unwrap();
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn strip_contains_the_vehicle_and_has_no_columns_beyond_the_tunnel() {
+    fn wall_strip_contains_the_vehicle_and_has_no_columns_beyond_the_tunnel() {
         for (at_m, count) in [(0.0, 400), (47.3, 400), (199.9, 400), (3.0, 20)] {
             let strip = wall(count, at_m).strip(Extent::Near, 60);
             let (column, _) = strip.vehicle.unwrap();

@@ -168,7 +168,7 @@ fn repeated_reports_are_withheld_and_counted() {
 }
 
 #[test]
-fn wrong_keys_are_named() {
+fn wrong_keys_of_the_vehicle_file_are_named() {
     let error = |own| configured(own).err().unwrap();
     assert!(error("fom_max_mps = 0\n").starts_with("v.toml:1: fom_max_mps = 0: must be a number from 0.001"));
     assert!(error("max_speed_mps = 20\n").contains("from 0.1 to 10"));

@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn token_decides_the_role() {
+    fn token_determines_the_role_of_the_viewer() {
         let access = access(false);
         assert_eq!(access.role_of("viewer-0123456789"), Some(Role::Viewer));
         assert_eq!(access.role_of("operator-01234567"), Some(Role::Operator));

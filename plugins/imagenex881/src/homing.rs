@@ -5,7 +5,7 @@ use headrace_sensor::sampling::head::HeadProgram;
 use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
 
-/// Range setting while homing, m: the shortest one that isn't the configured setting.
+/// Range setting while homing, m: the shortest one. It must differ from the configured setting.
 const RANGE_M: u8 = 1;
 
 /// Position and stepping direction of a head.
@@ -64,7 +64,7 @@ mod tests {
 
     /// An emulated head executes the homing commands, and then the first command of its scan program.
     #[test]
-    fn homed_head_continues_with_its_program() {
+    fn homed_head_continues_with_its_scan_program() {
         for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {
             let settings = settings(text).unwrap();
             for (from, start) in [(0.3, 5.0), (5.0, 0.3), (1.0, 1.0), (1.0, 1.0052), (0.0, 3.1), (6.2, 0.01)]

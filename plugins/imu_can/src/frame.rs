@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flags_give_the_kind_of_a_frame() {
+    fn identifier_flags_give_the_kind_of_a_can_frame() {
         let kind = |id: [u8; 4]| {
             let mut bytes = [0; FRAME_BYTES];
             bytes[..4].copy_from_slice(&id);

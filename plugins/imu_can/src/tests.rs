@@ -298,7 +298,7 @@ fn bosch_force_is_reported_when_its_last_component_arrives() {
 }
 
 #[test]
-fn wrong_keys_are_named() {
+fn wrong_keys_of_the_vehicle_file_are_named() {
     let error = |own| configured(own).err().unwrap();
     assert_eq!(error("rate_hz = 100\n"), "v.toml:1: preset: is missing");
     assert!(error("preset = \"vectornav\"\n").contains("xsens_mti600, sbg_ellipse, j1939, bosch_mm5"));
@@ -335,7 +335,7 @@ fn only_the_first_received_kind_of_sbg_time_is_followed() {
 }
 
 #[test]
-fn unmeasured_values_are_not_sent() {
+fn emulated_unit_sends_no_unmeasured_values() {
     let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
     for (own, set, whole, without) in [
         ("preset = \"xsens_mti600\"", XSENS, 4, 3),

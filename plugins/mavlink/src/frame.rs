@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn uncheckable_frame_is_skipped_without_hiding_others() {
+    fn unverifiable_frame_is_skipped_and_the_following_frames_are_read() {
         let mut unknown = RECORDED_ATTITUDE.to_vec();
         unknown[7] = 0xFF;
         unknown[8] = 0xFF;

@@ -403,7 +403,7 @@ impl LineService {
 
     /// Adds messages dropped by the carrier to the losses of the line's first device.
     ///
-    /// The device that sent them isn't known.
+    /// The device that sent the dropped messages isn't known.
     fn count_dropped(&mut self, line: &mut dyn Line) {
         let dropped = line.dropped();
         if let Some(first) = self.devices.first_mut().filter(|_| dropped > 0) {

@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn model_detects_a_stop_that_drains_too_early() {
+    fn loom_model_detects_a_stop_that_drains_too_early() {
         line_and_stop("the lines' stop, drained first", |tell, wait, drain| wind_up(tell, drain, wait));
     }
 }

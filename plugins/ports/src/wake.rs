@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     #[should_panic = "deadlock"]
-    fn model_detects_a_wake_before_the_send() {
+    fn loom_model_detects_a_wake_before_the_send() {
         explore("wake-up before the packet", Some(4), || line_and_loop(2, true));
     }
 }

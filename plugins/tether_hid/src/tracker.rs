@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn persistent_jump_is_accepted() {
+    fn persistent_jump_of_the_count_is_accepted() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let totals = take_all(&mut tracker, &[120_000, 90_000, 90_001, 90_002, 90_003, 90_004]);
         assert_eq!(totals, [Some(120_000), None, None, None, None, Some(90_004)]);

@@ -325,7 +325,7 @@ fn guesses_through_a_declared_proxy_count_for_the_forwarded_address() {
 }
 
 #[test]
-fn flood_gets_at_most_26_guesses_in_5_s() {
+fn flood_of_wrong_tokens_gets_at_most_26_guesses_in_5_s() {
     let served = served(&[]);
     let began = Instant::now();
     let (mut guesses, mut requests) = (0_u32, 0_u32);

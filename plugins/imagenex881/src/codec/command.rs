@@ -21,7 +21,7 @@ const REVERSE: u8 = 0x40;
 const UP_BAUD: u8 = 0x06;
 const STEP_CODES: [u8; 6] = [0, 1, 2, 3, 4, 8];
 
-/// Number of echo points.
+/// Number of echo points in a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Points {
     /// Nominally 250 points. Returns with 8-bit points (`IMX`) have 252.
@@ -55,7 +55,7 @@ pub struct Command {
     pub pulse_us: f64,
     /// Minimum range of the profile point, 0 to 25 m in steps of 0.1.
     pub min_range_m: f64,
-    /// Number of echo points.
+    /// Number of echo points in the return.
     pub points: Points,
     /// Number of bits of each echo point: 4, 8 or 16.
     pub data_bits: u8,

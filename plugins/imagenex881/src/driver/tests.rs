@@ -212,7 +212,7 @@ fn after_s(seconds: i64) -> MonoNs {
 }
 
 #[test]
-fn head_is_homed_to_its_program_from_any_position() {
+fn head_is_homed_to_its_scan_program_from_any_position() {
     let sector = HeadProgram { start_rad: 0.5, growing: false, sector: Some((0.0, PI / 2.0)) };
     for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {
         for program in [turning(0.0, true), turning(4.0, false), sector] {

@@ -59,7 +59,7 @@ fn counts(run: &Run) -> Vec<i32> {
 }
 
 #[test]
-fn pings_are_at_start_and_every_period() {
+fn pings_occur_at_the_start_and_once_per_ping_period() {
     let run = run("mode = \"fastest\"", DurNs::from_millis(5), turning(0.0, true), 400);
     for (i, k) in (0..400_u64).enumerate() {
         let ping = 7_000_000_000 + k * 32_000_000;
@@ -106,7 +106,7 @@ fn turn_ends_at_its_start_angle_and_continues_in_either_direction() {
 }
 
 #[test]
-fn inverted_sign_and_offset_do_not_change_the_program_in_the_sensor_frame() {
+fn inverted_angle_sign_and_offset_keep_the_scan_program_in_the_sensor_frame() {
     let text = "mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 33";
     let run = run(text, DurNs::ZERO, turning(PI / 2.0, true), 50);
     for (k, got) in (0..).zip(counts(&run)) {
@@ -142,7 +142,7 @@ fn sector_sweep_pings_each_end_once() {
 }
 
 #[test]
-fn step_that_does_not_divide_the_sector_is_shortened_at_its_end() {
+fn step_that_does_not_divide_the_sector_is_shortened_at_the_sector_end() {
     check_sweep("mode = \"fastest\"", 8, 0, 300, 0, true);
     check_sweep("mode = \"fast\"", 3, 400, 400, 800, false);
 }

@@ -124,7 +124,7 @@ pub struct Signal {
 /// Location of a signal in frames, and its conversion to a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Identifier of its frames.
+    /// Identifier of the frames that contain the signal.
     pub id: CanId,
     /// Length of the frames' data.
     pub frame_bytes: u8,

@@ -160,7 +160,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(4096))]
 
         #[test]
-        fn bits_match_a_walk_over_the_signal(
+        fn extracted_bits_match_a_bit_by_bit_reading_of_the_signal(
             data: [u8; 8], start in 0_u64..70, size in 0_u64..70, order in order(), bytes in 0_usize..=8,
         ) {
             let bits = walk(start, size, order);

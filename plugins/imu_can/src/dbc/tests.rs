@@ -311,7 +311,7 @@ fn worked_examples_of_other_makers_are_decoded() {
 }
 
 #[test]
-fn other_dbc_content_is_ignored() {
+fn dbc_content_other_than_signals_is_ignored() {
     let dbc = DbcFile::parse(&format!("\u{FEFF}{}", RICH.replace('\n', "\r\n"))).unwrap();
     let place = dbc.signal("Rate").unwrap().place;
     assert_eq!(place.id, CanId::Extended(100));

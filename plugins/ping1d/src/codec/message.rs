@@ -50,7 +50,7 @@ record! {
 }
 
 record! {
-    /// Legacy status summary.
+    /// Legacy summary of the device's status.
     GeneralInfo {
         /// Firmware version, major.
         firmware_major: u16,
@@ -289,7 +289,7 @@ messages! {
     Gain(u32) = GAIN 1207,
     /// Pulse length, us.
     TransmitDuration(u16) = TRANSMIT_DURATION 1208,
-    /// Legacy status summary.
+    /// Legacy summary of the device's status.
     GeneralInfo(GeneralInfo) = GENERAL_INFO 1210,
     /// Distance and confidence.
     DistanceSimple(DistanceSimple) = DISTANCE_SIMPLE 1211,
