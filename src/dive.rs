@@ -41,7 +41,7 @@ const NOTICES: usize = 1 << 10;
 /// nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
-/// Callback after every tick.
+/// Function that is called after every tick.
 type AfterTick<'a> = &'a mut dyn FnMut(&Loop);
 
 /// An armed loop with the vehicle's sensors, and the consumers of its results.
@@ -60,7 +60,7 @@ struct Operator {
     fails: bool,
 }
 
-/// A log to be written.
+/// A log to which a dive is recorded.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Recording<'a> {
     /// Paths of the log. Each path is a separate recording of the same dive.
@@ -79,7 +79,7 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Clock of the timestamps.
+/// Clock that gives a dive its timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Clock {
     /// This machine's monotonic clock.
@@ -194,7 +194,7 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     Ok((app, notices))
 }
 
-/// Tunnel and heads for viewers.
+/// Description of the tunnel and the heads for viewers such as Foxglove.
 pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
     let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
     let mission = vehicle.mission();

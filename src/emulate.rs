@@ -23,7 +23,7 @@ use crate::outputs::{self, Claims, Kind, REHEARSAL};
 /// Longest wait for bytes from a host, ns. It limits the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
 
-/// `headrace emulate`.
+/// Runs `headrace emulate`.
 pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     let (name, text) = (args.scene.display().to_string(), files::read(&args.scene)?);
     let beside = Beside::of(&args.scene);

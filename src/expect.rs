@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::files;
 use crate::logging::complain;
 
-/// Maximum number of differences listed.
+/// Maximum number of differences between two reports that are listed.
 const SHOWN: usize = 20;
 
 /// A golden report, which replays are compared with. It lacks the log's name and hash, and the history of

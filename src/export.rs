@@ -28,7 +28,7 @@ use crate::watch::Watch;
 /// Maximum total size of the recordings in a page, bytes. It is enough for two hours.
 const MOST_VOICE_BYTES: usize = 24 << 20;
 
-/// `headrace export`.
+/// Runs `headrace export`.
 pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
     let given = Given::read(args.vehicle.as_deref())?;

@@ -14,7 +14,7 @@ use crate::mavlink_out::MavlinkOut;
 use crate::tui::{Mode, Start, Tui};
 use crate::watch::{Show, Watch};
 
-/// Requested followers.
+/// Followers of a dive that the command line requests.
 pub(crate) struct Followers {
     tui: bool,
     /// Address that receives MAVLink, and MAVLink system id of the vehicle.

@@ -174,7 +174,7 @@ impl Drop for Foxglove {
     }
 }
 
-/// State of the server's thread.
+/// State of the thread that serves Foxglove.
 struct Server {
     handle: WebSocketServerHandle,
     channels: Vec<Option<Arc<RawChannel>>>,

@@ -70,7 +70,7 @@ const ENDS_WITHIN: Duration = Duration::from_secs(2);
 /// Writer of stderr on a separate thread.
 struct Background {
     lines: Sender<Line>,
-    /// Number of lines dropped for lack of room.
+    /// Number of log lines dropped because the queue was full.
     dropped: AtomicU64,
 }
 

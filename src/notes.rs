@@ -16,7 +16,7 @@ use crate::files;
 use crate::output::{deliver, say};
 use crate::outputs::{self, Claims, Kind};
 
-/// `headrace notes`.
+/// Runs `headrace notes`.
 pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
     let logs = files_of(&args.logs)?;
     let found = notes_of(&logs)?;

@@ -67,7 +67,7 @@ impl Kind {
         }
     }
 
-    /// Whether a file is of this kind.
+    /// Whether an existing file is output of this kind.
     fn is(self, path: &Path) -> bool {
         let logged = |key: &str| {
             let log = DiveLog::open(&[path.to_owned()]);

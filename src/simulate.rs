@@ -24,7 +24,7 @@ use crate::outputs::{Claims, Kind, SIMULATED, TRUTH};
 use crate::phase::Phase;
 use crate::progress::Progress;
 
-/// `headrace simulate`.
+/// Runs `headrace simulate`.
 pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let text = files::read(&args.scene)?;
     let name = args.scene.display().to_string();

@@ -14,7 +14,7 @@ use crate::terminal;
 
 /// Shortest period without data from a sensor that is reported, s.
 const SILENT_S: f64 = 5.0;
-/// Maximum number of notes listed.
+/// Maximum number of notes that the summary lists.
 const MOST_NOTES: usize = 20;
 
 /// Summary of a report as text. Its lines have at most `columns` columns, if given.
@@ -177,7 +177,7 @@ fn outside_text(dive: &DiveReport) -> String {
     format!("NO VERDICTS: the heads were outside the tunnel{place}: check the tether's zero and length_m")
 }
 
-/// Metres by verdict, as text.
+/// Metres of tunnel by verdict, as text.
 fn metres(judged: &OtherTargetReport) -> String {
     let OtherTargetReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
     metres_text(&LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })

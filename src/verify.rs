@@ -19,7 +19,7 @@ use crate::output::{deliver, say};
 use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
-/// `headrace verify`.
+/// Runs `headrace verify`.
 pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let given = Given::read(args.vehicle.as_deref())?;

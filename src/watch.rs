@@ -34,7 +34,7 @@ pub(crate) enum Show {
     Nothing,
     /// No lines, because a follower uses the terminal.
     Followers,
-    /// Lines for people.
+    /// Lines of text for people.
     Lines,
     /// JSON objects, one per line.
     JsonLines,
@@ -74,7 +74,7 @@ impl Watch {
         Self::new(Show::Nothing)
     }
 
-    /// Adds a follower.
+    /// Adds a follower of the dive.
     #[must_use]
     pub(crate) fn followed_by(mut self, follower: Box<dyn Follower>) -> Self {
         self.followers.push(follower);

@@ -143,7 +143,7 @@ pub(crate) struct Material<'a> {
     pub(crate) profile: &'a Profile,
     /// Water and location, from the vehicle file.
     pub(crate) site: Site,
-    /// Noise settings of the sensors.
+    /// Measurement noise of the sensors.
     pub(crate) settings: Settings,
     /// The sensors of the vehicle file, by number of their packet source.
     pub(crate) sensors: &'a [SensorInfo],

@@ -176,7 +176,7 @@ pub(crate) enum NotEstimated {
          in the vehicle file, or correct the profile there; other values can be estimated only afterwards"
     )]
     Scaled {
-        /// Relative excess of the ranges, %.
+        /// Relative excess of the ranges over those expected from the profile, %.
         long_pct: f64,
         /// Speed of sound at which the ranges have no excess, m/s.
         sound_mps: f64,

@@ -61,12 +61,12 @@ const MOST_ECHO_COST: f64 = 100.0;
 /// Largest change of a head's angle in one round of the fit, radians.
 const MOST_STEP_RAD: f64 = 0.2;
 
-/// Input of a fit.
+/// Input of a fit of the vehicle's position and the heads' mounts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Problem<'a> {
     /// Design profile of the tunnel's cross-section.
     pub(crate) profile: &'a Profile,
-    /// Noise settings of the sonars.
+    /// Measurement noise of the sonars.
     pub(crate) settings: &'a Settings,
     /// Returns of each head. The number of heads is limited by the number of unknowns.
     pub(crate) heads: &'a [HeadScan],
@@ -93,7 +93,7 @@ pub(crate) struct Fit<const N: usize> {
     pub(crate) scale_m: f64,
 }
 
-/// Residual of a return.
+/// Range residual of a head's return.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual<const N: usize> {
     /// Index of the head that received the return.
@@ -204,7 +204,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Residuals of all returns.
+    /// Range residuals of all heads' returns.
     pub(crate) fn residuals<const N: usize>(&self, x: &[f64; N]) -> Vec<Residual<N>> {
         let mut all = Vec::new();
         for (head, scan) in self.heads.iter().enumerate() {

@@ -32,17 +32,17 @@ const ROUNDS: usize = 12;
 pub(crate) struct Head {
     /// Number of the head's packet source.
     pub(crate) source: usize,
-    /// Mount in the vehicle file.
+    /// Mount of the head in the vehicle file.
     pub(crate) filed: Mount,
     /// Estimated mount; the file's mount if there is no estimate.
     pub(crate) found: Mount,
     /// Sector from which the head received returns, degrees.
     pub(crate) seen_deg: f64,
-    /// Number of returns used.
+    /// Number of the head's returns used in the fit.
     pub(crate) used: usize,
     /// Number of returns rejected as outliers, or because they grazed the wall.
     pub(crate) rejected: usize,
-    /// Root mean square residual of the returns used, m.
+    /// Root mean square of the range residuals of the returns used, m.
     pub(crate) rms_m: f64,
     /// Angle to be added to the head's angle about its axis, radians, in the estimated sense of rotation.
     pub(crate) angle_rad: Result<Estimate, NotEstimated>,

@@ -39,7 +39,7 @@ pub(crate) struct Return {
 pub(crate) struct HeadScan {
     /// Number of the head's packet source.
     pub(crate) source: usize,
-    /// Mount in the vehicle file.
+    /// Mount of the head in the vehicle file.
     pub(crate) mount: Mount,
     /// Returns of the head.
     pub(crate) returns: Vec<Return>,
@@ -48,7 +48,7 @@ pub(crate) struct HeadScan {
 /// Range of an echosounder while the vehicle stands still.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct EchoScan {
-    /// Mount in the vehicle file.
+    /// Mount of the echosounder in the vehicle file.
     pub(crate) mount: Mount,
     /// Median of the echosounder's ranges, at the site's speed of sound, m.
     pub(crate) range_m: f64,

@@ -62,7 +62,7 @@ pub(crate) struct Still {
 /// Values of one source, by time bin.
 type Raw = (Sign, Vec<Vec<f64>>);
 
-/// Medians of these values.
+/// Medians of one source's values, by time bin.
 struct Channel {
     sign: Sign,
     by_bin: Vec<Option<f64>>,

@@ -13,14 +13,14 @@ use crate::calibrate::zero::Zero;
 /// It is three times the error of tabulated speeds of sound.
 const MOST_SCALE: f64 = 0.01;
 
-/// A value in the unit of its row.
+/// Value of a quantity in the vehicle file and as estimated, in the quantity's unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Value {
     /// A quantity that is a number.
     Number {
         /// Value in the vehicle file.
         file: f64,
-        /// Estimate.
+        /// Estimated value.
         found: Estimate,
     },
     /// Direction in which a head faces.

@@ -23,7 +23,7 @@ pub(crate) struct Zero {
     pub(crate) source: usize,
     /// Estimated zero, in the unit of the quantity.
     pub(crate) found: Estimate,
-    /// Number of readings used.
+    /// Number of readings used for the estimate.
     pub(crate) readings: usize,
 }
 

@@ -89,7 +89,7 @@ impl Outlook {
         }))
     }
 
-    /// Largest speed in the heads' own mode, m/s.
+    /// Largest speed in the mode to which all heads are set, m/s.
     pub(super) fn v_max_mps(&self) -> Option<f64> {
         self.own.as_ref().and_then(|own| own.v_max_mps)
     }

@@ -19,7 +19,7 @@ use crate::outputs::{self, Claims, Kind, PICTURE};
 use case::{Case, Findings, printed_mps};
 use pictures::Shown;
 
-/// `headrace plan`.
+/// Runs `headrace plan`.
 pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
     let case = Case::of(args)?;
     if let Some(folder) = &args.svg {

@@ -35,7 +35,7 @@ const TICK: DurNs = DurNs::from_millis(20);
 /// no fix.
 const BRIDGED: DurNs = DurNs::from_millis(2000);
 
-/// `headrace trim`.
+/// Runs `headrace trim`.
 pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let given = Given::read(args.vehicle.as_deref().filter(|_| needs_vehicle(args)))?;
@@ -155,7 +155,7 @@ fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> R
     Ok(said)
 }
 
-/// Writes the new log atomically.
+/// Writes the trimmed log atomically.
 fn write(
     args: &Trim,
     files: &[PathBuf],

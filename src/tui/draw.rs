@@ -20,9 +20,9 @@ use super::screen_buffer::{Palette, Rows};
 use super::wall::{Extent, Wall};
 use crate::cli::KEYS;
 
-/// Maximum number of message lines kept.
+/// Maximum number of message lines that the screen keeps.
 const MOST_TOLD: usize = 100;
-/// Minimum size of the screen.
+/// Minimum size of the screen, columns and rows.
 const LEAST: (u16, u16) = (40, 10);
 /// Minimum size of the screen at which the allowed speed is also shown in large digits.
 const LARGE: (u16, u16) = (90, 34);

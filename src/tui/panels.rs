@@ -1,4 +1,4 @@
-//! Panels of the screen.
+//! Draws the panels of the screen.
 
 use headrace_config::plain::one_line;
 use headrace_coverage::Verdict;

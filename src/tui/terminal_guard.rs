@@ -71,7 +71,7 @@ impl TerminalGuard {
         self.0.try_clone()
     }
 
-    /// Number of columns and rows.
+    /// Number of columns and rows of the terminal.
     pub(super) fn size(&self) -> (u16, u16) {
         match tcgetwinsize(&self.0) {
             Ok(size) if size.ws_col > 0 && size.ws_row > 0 => (size.ws_col, size.ws_row),

@@ -31,13 +31,13 @@ pub enum Against {
 pub struct Velocity {
     /// Reference of the velocity.
     pub against: Against,
-    /// Velocity, m/s.
+    /// Velocity of the vehicle in device axes, m/s.
     pub velocity_mps: [f64; 3],
     /// Figure of merit: error estimate of the velocity, m/s.
     pub fom_mps: f64,
     /// Distance to the reflecting surface along z, m.
     pub altitude_m: f64,
-    /// Number of valid beams.
+    /// Number of beams with a valid measurement.
     pub valid_beams: u8,
     /// Whether the device marks velocity and altitude as valid.
     pub is_valid: bool,

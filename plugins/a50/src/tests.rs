@@ -155,7 +155,7 @@ fn repeated_reports_are_withheld_and_counted() {
     let reports = [
         (good(), 1),
         (good(), 0),
-        // Same timestamp as before, different velocity.
+        // This report has the previous report's timestamp, but another velocity.
         (Velocity { velocity_mps: [0.4, 0.0, 0.0], ..good() }, 0),
         (Velocity { velocity_mps: [0.4, 0.0, 0.0], times_us: later, ..good() }, 0),
         (Velocity { times_us: Some([1_200_000, 1_320_000]), ..good() }, 1),

@@ -183,7 +183,7 @@ pub struct Overrides {
     pub p_min_bar: Option<f64>,
     /// Upper limit of the pressure range, bar.
     pub p_max_bar: Option<f64>,
-    /// Pressure mode.
+    /// Pressure mode of the sensor.
     pub mode: Option<PressureMode>,
 }
 

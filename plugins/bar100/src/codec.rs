@@ -9,7 +9,7 @@
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 
-/// Command that starts a conversion.
+/// Command that starts a conversion of pressure and temperature.
 pub const MEASURE: u8 = 0xAC;
 
 /// Memory cells lie below the commands, so the first byte alone gives a transaction's length.
@@ -24,7 +24,7 @@ pub const MEMORY_BYTES: usize = 4;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status(u8);
 
-/// The result of a conversion, in counts.
+/// The result of a conversion of pressure and temperature, in counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Measurement {
     /// Status byte of the sensor.
@@ -50,7 +50,7 @@ pub struct MemoryWord {
 /// A successful transaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Transaction {
-    /// A conversion's result.
+    /// The result of a conversion of pressure and temperature.
     Measurement(Measurement),
     /// A word of the sensor's memory.
     Memory(MemoryWord),

@@ -14,9 +14,9 @@ const TOKEN_BYTES: usize = 16;
 /// Role of a viewer of the page, which decides about the viewer's rights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// May only watch.
+    /// A viewer who may only watch.
     Viewer,
-    /// May watch, acknowledge, take notes, and control a replay.
+    /// An operator, who may also acknowledge alerts, take notes, and control a replay.
     Operator,
 }
 

@@ -93,7 +93,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Keyword of the command.
+    /// Keyword that names the command in a message.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Acknowledge { .. } => "acknowledge",
@@ -124,7 +124,7 @@ pub enum Play {
     Seek(f64),
 }
 
-/// A validated request.
+/// A viewer's request, parsed and validated.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Asked {
     Command(Command),

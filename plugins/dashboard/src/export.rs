@@ -36,10 +36,10 @@ const LEFT_OUT: [&str; 8] =
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// The thread can't be started.
+    /// The export's thread can't be started.
     #[error("exporting a dive: its thread can't be started: {0}")]
     Thread(io::Error),
-    /// The thread has panicked.
+    /// The export's thread has panicked.
     #[error("exporting a dive: its thread has ended early")]
     Ended,
     /// The program was built without the page.
@@ -208,7 +208,7 @@ impl States {
     }
 }
 
-/// Rounds numbers to four decimal places.
+/// Rounds all numbers in a JSON value to four decimal places.
 fn short(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {

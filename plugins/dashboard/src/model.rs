@@ -35,7 +35,7 @@ pub const MOST_IN_RANGE: usize = 200_000;
 pub enum Sort {
     /// A live state, which replaces the previous one.
     State,
-    /// New samples.
+    /// Samples since the last message.
     Samples,
     /// Any other message.
     Other,
@@ -394,7 +394,7 @@ impl Model {
             .unwrap_or_else(|error| json!({"error": error.to_string()}))
     }
 
-    /// Returns the state as a message.
+    /// Returns the live state as a message.
     pub fn state(&self) -> Option<Value> {
         let (state, beside) = &**self.state.as_ref()?;
         let mut value = serde_json::to_value(state).ok()?;
@@ -410,7 +410,7 @@ impl Model {
         Some(value)
     }
 
-    /// Returns the time of the state, seconds.
+    /// Returns the time of the live state, seconds.
     pub fn now_s(&self) -> Option<f64> {
         self.state.as_ref().map(|shown| shown.0.now_s)
     }
@@ -469,7 +469,7 @@ impl Model {
     }
 }
 
-/// Returns a message with a number added.
+/// Returns a message with its message number added.
 fn numbered(value: &Value, seq: u64) -> Value {
     let mut value = value.clone();
     if let Some(object) = value.as_object_mut() {

@@ -22,7 +22,7 @@ pub enum Mode {
     File,
 }
 
-/// A profiling head.
+/// A profiling head, as described to the page.
 #[derive(Debug, Clone, Serialize)]
 pub struct HeadSite {
     /// Sensor id.
@@ -34,7 +34,7 @@ pub struct HeadSite {
     pub hidden_deg: Vec<[f64; 2]>,
 }
 
-/// A sensor.
+/// A sensor, as described to the page.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorSite {
     /// Sensor id.
@@ -54,7 +54,7 @@ pub struct Site {
     pub dive: String,
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Target T, m.
+    /// Target T, the largest hole that may pass, m.
     pub target_m: f64,
     /// Second target, for which all sections are judged too, m; `None` without one.
     pub compared_m: Option<f64>,
@@ -64,7 +64,7 @@ pub struct Site {
     pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// Design profile.
+    /// Design profile of the tunnel's cross-section.
     pub profile: Profile,
     /// The heads, in the order of their source numbers.
     pub heads: Vec<HeadSite>,

@@ -127,7 +127,7 @@ pub enum Outcome {
 pub struct SampleRecord {
     /// Milliseconds since the dive began.
     pub t_ms: u32,
-    /// Chainage, m.
+    /// Chainage of the sample, m.
     pub x_m: f32,
     /// Distance to the left of the axis, m; NaN without a return.
     pub y_m: f32,
@@ -135,9 +135,9 @@ pub struct SampleRecord {
     pub z_m: f32,
     /// Arc length, in steps of 1/65,536 of the perimeter.
     pub arc: u16,
-    /// Number of the head; 255 if unknown.
+    /// Number of the head that took the sample; 255 if unknown.
     pub head: u8,
-    /// Value of [`Outcome`].
+    /// Outcome of the ping, as a value of [`Outcome`].
     pub outcome: u8,
 }
 

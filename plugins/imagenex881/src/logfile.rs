@@ -41,19 +41,19 @@ pub enum LogFileError {
     /// There is no shot header at the expected offset.
     #[error("log file: shot at byte {offset} begins with {got:02X?}; allowed are 852, 81A, 81B, 81S, 31L")]
     Magic {
-        /// Offset in the file.
+        /// Offset of the shot in the file.
         offset: usize,
-        /// The three bytes found.
+        /// The three bytes found at this offset.
         got: [u8; 3],
     },
     /// The file ends within a shot.
     #[error("log file: shot at byte {offset} needs {needed} bytes and the file has {left} more")]
     Short {
-        /// Offset in the file.
+        /// Offset of the shot in the file.
         offset: usize,
-        /// Number of bytes needed.
+        /// Number of bytes that the shot needs.
         needed: usize,
-        /// Number of bytes left.
+        /// Number of bytes left in the file.
         left: usize,
     },
     /// The return is longer than the shot.
@@ -61,7 +61,7 @@ pub enum LogFileError {
         "log file: shot at byte {offset} has {total} bytes, but it needs more: a header of 100 and a return of {raw}"
     )]
     Lengths {
-        /// Offset in the file.
+        /// Offset of the shot in the file.
         offset: usize,
         /// Length of the shot as stated in its header.
         total: usize,

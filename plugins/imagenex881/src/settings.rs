@@ -50,11 +50,11 @@ pub struct Settings {
     pub command: Command,
     /// Step in counts of 0.3 degrees, one of those supported by the command.
     pub step_counts: u8,
-    /// Ping period.
+    /// Time between two successive pings.
     pub ping_period: DurNs,
     /// +1 if device angles increase with the sensor frame's angles, else -1.
     pub angle_sign: f64,
-    /// Sensor angle at device angle 0, radians.
+    /// Angle in the sensor frame at device angle 0, radians.
     pub angle_offset_rad: f64,
     /// Size of the head's housing.
     pub body: HeadBody,

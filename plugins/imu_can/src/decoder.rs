@@ -28,7 +28,7 @@ pub enum AxisOrder {
 pub struct DecoderSettings {
     /// The maker's message set.
     pub set: MessageSet,
-    /// Axis order; used for the J1939 set.
+    /// Axis order of the unit; used only for the J1939 set.
     pub axis_order: AxisOrder,
     /// Tick of the sample time; used for the Xsens set.
     pub sample_time_tick: DurNs,
@@ -87,7 +87,7 @@ impl AxisOrder {
 }
 
 impl ImuDecoder {
-    /// Creates a decoder.
+    /// Creates a decoder with these settings.
     pub fn new(meaning: DecoderSettings) -> Self {
         let state = State {
             meaning,

@@ -30,9 +30,9 @@ pub enum CanId {
 /// Kind of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameKind {
-    /// Data from a device.
+    /// A data frame from a device.
     Data(CanId),
-    /// A request for data.
+    /// A remote frame, which requests data.
     Remote(CanId),
     /// An error frame from the controller, with its error class bits.
     Error(u32),
@@ -46,7 +46,7 @@ pub struct CanFrame {
     data: [u8; 8],
 }
 
-/// A reason why bytes are no frame.
+/// A reason why bytes are no CAN frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
@@ -85,7 +85,7 @@ impl CanId {
 }
 
 impl Payload {
-    /// Appends bytes. Bytes beyond eight are dropped.
+    /// Appends bytes to the data. Bytes beyond eight are dropped.
     #[must_use]
     pub fn with(mut self, bytes: &[u8]) -> Self {
         for byte in bytes {
@@ -162,7 +162,7 @@ impl CanFrame {
         Self::of_kind(kind, data.get(..usize::from(*len)).ok_or(FrameError::Length(usize::from(*len)))?)
     }
 
-    /// Encodes a `can_frame`.
+    /// Encodes the frame as a `can_frame`.
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
         let bits = match self.kind {
             FrameKind::Data(id) => id.bits(),

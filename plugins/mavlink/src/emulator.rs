@@ -175,7 +175,7 @@ fn heartbeat(header: MavHeader) -> MAVLinkV2MessageRaw {
     encode(header, &heartbeat)
 }
 
-/// Nearest value within the wire's range.
+/// Whole number nearest to a value, within the range of the wire format.
 fn counts(value: f64) -> i16 {
     let counts = math::round_to_i64(value);
     i16::try_from(counts).unwrap_or(if counts < 0 { i16::MIN } else { i16::MAX })

@@ -28,7 +28,7 @@ const V2_HEADER_BYTES: usize = STX_SIZE + v2::MIN_HEADER_SIZE;
 /// A MAVLink frame with a correct checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    /// Protocol version.
+    /// MAVLink version of the frame.
     pub version: MavlinkVersion,
     /// Sender and sequence number of the frame.
     pub header: MavHeader,

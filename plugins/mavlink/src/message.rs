@@ -33,10 +33,10 @@ pub enum Message {
     Distance(Distance),
 }
 
-/// RAW_IMU and SCALED_IMU to SCALED_IMU3.
+/// Content of RAW_IMU and of SCALED_IMU to SCALED_IMU3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Imu {
-    /// Message type.
+    /// Type of the message.
     pub message: ImuMessage,
     /// Time since the autopilot's boot, or since 1970. The SCALED_IMU messages have it in milliseconds.
     pub time_us: u64,
@@ -48,12 +48,12 @@ pub struct Imu {
     pub unit: u8,
 }
 
-/// SCALED_PRESSURE to SCALED_PRESSURE3.
+/// Content of SCALED_PRESSURE to SCALED_PRESSURE3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressure {
-    /// Message type.
+    /// Type of the message.
     pub message: PressureMessage,
-    /// Time since boot.
+    /// Time since the autopilot's boot.
     pub time_boot_ms: u32,
     /// Absolute pressure.
     pub absolute_hpa: f32,
@@ -61,10 +61,10 @@ pub struct Pressure {
     pub temperature_cdegc: i16,
 }
 
-/// DISTANCE_SENSOR.
+/// Content of DISTANCE_SENSOR.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Distance {
-    /// Time since boot.
+    /// Time since the autopilot's boot.
     pub time_boot_ms: u32,
     /// Minimum measurable distance.
     pub least_cm: u16,

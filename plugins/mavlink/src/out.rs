@@ -13,7 +13,7 @@ use crate::dialect::{
 };
 use crate::frame::encode;
 
-/// MAV_COMP_ID_ONBOARD_COMPUTER. Source: MAVLink, MAV_COMPONENT.
+/// Component id of an onboard computer. Source: MAVLink, MAV_COMP_ID_ONBOARD_COMPUTER.
 pub const COMPONENT_ID: u8 = 191;
 /// Maximum length of the text in a STATUSTEXT. Longer texts are sent in parts. Source: MAVLink, STATUSTEXT.
 pub const TEXT_BYTES: usize = 50;

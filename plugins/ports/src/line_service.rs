@@ -55,7 +55,7 @@ pub struct Attached {
     pub source: usize,
     /// Writing end of the sensor's ring buffer.
     pub port: Port,
-    /// Driver on the host's side.
+    /// Driver of the device, which runs on the host.
     pub driver: Box<dyn Driver>,
 }
 
@@ -66,7 +66,7 @@ pub struct Common {
     pub host: Arc<dyn Host>,
     /// Flag that ends the services of all lines.
     pub stopping: Arc<AtomicBool>,
-    /// Queue for changes of status.
+    /// Queue for changes of the devices' status.
     pub board: StatusQueue,
     /// Wakes the loop after packets have arrived.
     pub waker: Waker,

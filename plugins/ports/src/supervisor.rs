@@ -36,7 +36,7 @@ pub struct Connection {
     pub connect: Result<Connect, ConnectError>,
     /// Writing end of the sensor's ring buffer.
     pub port: Port,
-    /// Driver on the host's side.
+    /// Driver of the device, which runs on the host.
     pub driver: Box<dyn Driver>,
 }
 

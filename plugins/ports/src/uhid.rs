@@ -56,9 +56,9 @@ pub enum UhidError {
         what: &'static str,
         /// Length of the field, bytes.
         bytes: usize,
-        /// Minimum length, bytes.
+        /// Minimum length of the field, bytes.
         least: usize,
-        /// Maximum length, bytes.
+        /// Maximum length of the field, bytes.
         most: usize,
     },
     /// The kernel refused an event.
@@ -74,7 +74,7 @@ pub enum UhidError {
     Cut {
         /// Name of the event.
         event: &'static str,
-        /// Number of bytes accepted.
+        /// Number of bytes of the event that the kernel accepted.
         taken: usize,
         /// Length of the event, bytes.
         bytes: usize,

@@ -16,14 +16,14 @@ pub trait Threads {
     /// Returns a handle of this thread.
     fn current() -> Self::Thread;
 
-    /// Sets a thread's token.
+    /// Sets a thread's token, which ends the thread's wait.
     fn unpark(thread: &Self::Thread);
 
     /// Waits for this thread's token, at most this long, and takes it.
     fn park(at_most: Duration);
 }
 
-/// Threads of the system.
+/// Threads of the operating system.
 pub struct System;
 
 impl Threads for System {

@@ -19,7 +19,7 @@ const MILLISECOND: DurNs = DurNs::from_millis(1);
 /// Decoding settings of a HID counter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Counter {
-    /// Report layout.
+    /// Layout of the counter's reports.
     pub layout: ReportLayout,
     /// Whether the auxiliary value is the device time in milliseconds.
     pub auxiliary_is_ms: bool,

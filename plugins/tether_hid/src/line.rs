@@ -15,7 +15,7 @@ use headrace_sensor::geometry::math;
 /// for themselves.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
-/// Maximum line length.
+/// Maximum length of a line, bytes.
 pub const MAX_LINE_BYTES: usize = STAMPED.len();
 
 /// Offset in a template after `RD,`. A match up to this offset is unlikely to be chance.
@@ -84,7 +84,7 @@ impl Decimal {
         (0..=most_places).rev().find_map(with).unwrap_or(Self::ZERO)
     }
 
-    /// Value as a float.
+    /// Value of the number as a float.
     pub fn value(self) -> f64 {
         f64::from(self.mantissa) * self.quantum()
     }

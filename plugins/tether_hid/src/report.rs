@@ -8,7 +8,7 @@
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 
-/// Maximum report length: an id and the payload of a full-speed interrupt transfer.
+/// Maximum length of a report, bytes: an id and the payload of a full-speed interrupt transfer.
 pub const MAX_REPORT_BYTES: usize = 65;
 
 /// Report descriptor of the reference layout: vendor page 0xFF00, usage 1, report id 1, 80 bits of input.
@@ -79,7 +79,7 @@ pub struct Report {
     pub auxiliary: Option<i32>,
 }
 
-/// A reason why a layout is invalid.
+/// A reason why a report layout is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LayoutError {

@@ -36,7 +36,7 @@ const AWAY: DurNs = DurNs::from_millis(100);
 pub enum Counting {
     /// Count since the device's zero. The count wraps.
     Absolute,
-    /// Change since the previous report.
+    /// Change of the count since the previous report.
     Delta,
 }
 

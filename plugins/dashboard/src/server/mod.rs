@@ -85,7 +85,7 @@ pub enum PageError {
         /// Error of the last port tried.
         source: io::Error,
     },
-    /// The thread or runtime can't be started.
+    /// The page's thread or its async runtime can't be started.
     #[error("the page's thread can't be started: {0}")]
     Thread(io::Error),
     /// TLS can't be set up.
@@ -130,7 +130,7 @@ pub(crate) struct Counts {
     pub(crate) bytes: AtomicU64,
 }
 
-/// State shared by the handlers.
+/// State shared by all handlers of requests.
 pub(crate) struct Shared {
     model: Mutex<Model>,
     pub(crate) access: Access,

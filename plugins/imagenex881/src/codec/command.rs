@@ -110,9 +110,9 @@ pub enum CommandError {
     Fixed {
         /// Index of the byte in the command.
         index: usize,
-        /// Actual value.
+        /// Actual value of the byte.
         got: u8,
-        /// Required value.
+        /// Required value of the byte.
         wanted: u8,
     },
 }

@@ -4,10 +4,10 @@
 
 use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
 
-/// Maximum echo length.
+/// Maximum length of a return's echo, bytes.
 pub const MAX_ECHO_BYTES: usize = MAX_ECHO as usize;
 
-/// Maximum return length.
+/// Maximum length of a return, bytes.
 pub const MAX_RETURN_BYTES: usize = HEADER_BYTES + MAX_ECHO_BYTES + 1;
 
 /// Maximum head position of an 881: +180 degrees.
@@ -108,7 +108,7 @@ pub struct Header {
     pub position: u16,
     /// Whether the head steps clockwise.
     pub clockwise: bool,
-    /// Range setting, m.
+    /// Range setting of the ping, m.
     pub range_m: u8,
     /// Profile range in counts of [`Header::count_mm`], 14 bits; 0 if no echo was above the threshold.
     pub profile_counts: u16,
@@ -117,7 +117,7 @@ pub struct Header {
 /// A whole return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Return {
-    /// The header.
+    /// The header of the return.
     pub header: Header,
     /// Echo strengths, packed by the command's number of data bits. Empty in [`Tag::Ipx`].
     pub echo: Bytes<MAX_ECHO_BYTES>,
@@ -130,10 +130,10 @@ pub enum ReturnError {
     /// The tag, the first three bytes of the return, is unknown.
     #[error("return: tag {got:02X?}; allowed are IMX, IGX, IPX, INA, INB, INC")]
     Tag {
-        /// The three bytes received.
+        /// The three bytes received in place of a tag.
         got: [u8; 3],
     },
-    /// There are too few bytes.
+    /// There are too few bytes for a whole return.
     #[error("return: {got} bytes; needed are {needed}")]
     Short {
         /// Number of bytes present.
@@ -160,7 +160,7 @@ pub enum ReturnError {
     /// The terminator isn't 0xFC.
     #[error("return: ends in {got:#04X}; allowed is 0xFC")]
     Terminator {
-        /// Byte received.
+        /// Byte received in place of the terminator.
         got: u8,
     },
 }

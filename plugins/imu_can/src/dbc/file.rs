@@ -21,15 +21,15 @@ const EXTENDED: u64 = 1 << 31;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DbcError {
-    /// The text is no DBC text.
+    /// The text isn't valid in the DBC format.
     #[error("reading the DBC: {problem}")]
     Parse {
-        /// Line, counted from one.
+        /// Number of the faulty line, counted from one.
         line: usize,
         /// Offending text.
         problem: String,
     },
-    /// The text is too long.
+    /// The DBC text is too long.
     #[error(
         "reading the DBC: {0} bytes; at most {MOST_BYTES} are allowed: keep only the messages of the unit"
     )]

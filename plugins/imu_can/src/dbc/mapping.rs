@@ -52,9 +52,9 @@ pub enum MappingError {
         signal: String,
         /// Expected quantity.
         quantity: &'static str,
-        /// Unit in the DBC.
+        /// Unit of the signal in the DBC.
         unit: String,
-        /// Allowed units.
+        /// Allowed units of the quantity.
         allowed: String,
     },
     /// The signal can't be a sample time, since its tick is unsuitable.
@@ -65,9 +65,9 @@ pub enum MappingError {
     Time {
         /// Name of the signal.
         signal: String,
-        /// Factor, as text.
+        /// Factor of the signal, as text.
         factor: String,
-        /// Unit in the DBC.
+        /// Unit of the signal in the DBC.
         unit: String,
     },
     /// The mask or value of a validity condition has bits beyond the signal.
@@ -82,7 +82,7 @@ pub enum MappingError {
         bits: u32,
         /// Mask of the checked bits.
         mask: u64,
-        /// Required value.
+        /// Value that the checked bits must have.
         value: u64,
     },
 }
@@ -174,7 +174,7 @@ impl Axes {
 }
 
 impl Unit {
-    /// Converts a value from this unit to SI.
+    /// Converts a value from this unit to the SI unit.
     pub fn to_si(self, value: f64) -> f64 {
         match self {
             Self::Si => value,
@@ -183,7 +183,7 @@ impl Unit {
         }
     }
 
-    /// Converts a value from SI to this unit.
+    /// Converts a value from the SI unit to this unit.
     pub fn of_si(self, value: f64) -> f64 {
         match self {
             Self::Si => value,

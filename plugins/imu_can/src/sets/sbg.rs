@@ -49,9 +49,9 @@ pub enum Message {
     ImuInfo {
         /// Time since power-on, microseconds.
         time_us: u32,
-        /// Status bits.
+        /// Status bits of the unit.
         status: ImuStatus,
-        /// Temperature.
+        /// Temperature of the unit.
         temperature: i16,
     },
     /// Specific force.

@@ -58,11 +58,11 @@ pub enum Message {
     Error(u8),
     /// Sample timestamp, in ticks of configurable length (100 us by most sources).
     SampleTime(u32),
-    /// Sample number, wrapping.
+    /// Number of the sample, which wraps.
     GroupCounter(u16),
     /// UTC of the sample.
     Utc(Utc),
-    /// Status bits.
+    /// Status bits of the device.
     StatusWord(StatusWord),
     /// Rotation from the sensor to the local earth frame (z up); w x y z.
     Quaternion([i16; 4]),
@@ -80,7 +80,7 @@ pub enum Message {
     FreeAcceleration([i16; 3]),
     /// Magnetic field.
     MagneticField([i16; 3]),
-    /// Temperature.
+    /// Temperature of the device.
     Temperature(i16),
     /// Air pressure inside the housing.
     BaroPressure(u32),

@@ -88,7 +88,7 @@ record! {
         pulse_us: u16,
         /// Number of pings since the device was switched on.
         ping_number: u32,
-        /// Listening range.
+        /// Listening range of the ping.
         scan: ScanRange,
         /// Gain index, 0 to 6.
         gain: u32,
@@ -107,7 +107,7 @@ pub struct Profile {
 /// Length of a profile before its strengths: the distance fields and the count.
 const PROFILE_HEADER: usize = Distance::LEN + u16::LEN;
 
-/// Maximum number of strengths in a payload.
+/// Maximum number of echo strengths in a payload.
 pub const MAX_STRENGTHS: usize = MAX_PAYLOAD_BYTES - PROFILE_HEADER;
 
 /// Text as sent: any bytes, with or without a terminating zero.
@@ -140,12 +140,12 @@ pub enum MessageError {
         /// Length of the payload.
         len: usize,
     },
-    /// The count of strengths doesn't match the payload length.
+    /// The stated number of echo strengths doesn't match the payload length.
     #[error("ping profile: {announced} strengths are announced, but {present} are present")]
     Count {
-        /// Count as stated in the profile.
+        /// Number of echo strengths as stated in the profile.
         announced: u16,
-        /// Count as computed from the payload length.
+        /// Number of echo strengths as computed from the payload length.
         present: usize,
     },
     /// The id may not be sent as an unknown message.
@@ -263,7 +263,7 @@ messages! {
     SetAnyDeviceId(u8) = SET_ANY_DEVICE_ID 100,
     /// Sets the echosounder's device id.
     SetDeviceId(u8) = SET_DEVICE_ID 1000,
-    /// Sets the listening range.
+    /// Sets the listening range of the device.
     SetRange(ScanRange) = SET_RANGE 1001,
     /// Sets the speed of sound, mm/s.
     SetSpeedOfSound(u32) = SET_SPEED_OF_SOUND 1002,
@@ -279,7 +279,7 @@ messages! {
     Voltage5(u16) = VOLTAGE_5 1202,
     /// Speed of sound setting, mm/s.
     SpeedOfSound(u32) = SPEED_OF_SOUND 1203,
-    /// Listening range.
+    /// Listening range of the device.
     Range(ScanRange) = RANGE 1204,
     /// Whether the device chooses range and gain.
     ModeAuto(bool) = MODE_AUTO 1205,

@@ -23,7 +23,7 @@ pub struct Senders {
 /// Function that checks whether bytes contain a message of a device on the line.
 pub type IsValid<'a> = &'a dyn Fn(&[u8]) -> bool;
 
-/// An open line.
+/// An open line to one or several devices.
 pub trait Line: Send {
     /// Waits up to `wait` for bytes. Returns the receive time of the first byte, and the count; `None` on timeout.
     ///
