@@ -25,7 +25,7 @@ use crate::report_output::{exit_code, note_losses};
 use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
-/// Maximum total size of the recordings in a page, bytes. It is enough for two hours.
+/// Maximum total size of the voice notes' recordings in an exported page, bytes. It is enough for two hours.
 const MOST_VOICE_BYTES: usize = 24 << 20;
 
 /// Runs `headrace export`.

@@ -1,4 +1,4 @@
-//! Interface of followers of a dive besides the terminal, such as a page or another program.
+//! Interface of a dive's followers: the page, the full-screen display, and outputs to other programs.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::live_messages::LiveMessage;

@@ -150,7 +150,8 @@ pub(crate) fn release() {
     }
 }
 
-/// Writes a line to stderr after the lines that are queued. The line may hold external text.
+/// Writes a line to stderr after the lines that are queued. The line may contain text from outside the
+/// program.
 pub(crate) fn complain(text: &str) {
     pass(format!("{}\n", one_line(text)).as_bytes());
 }

@@ -200,12 +200,12 @@ pub(crate) fn put_line(text: &str) {
     put(&format!("{text}\n"));
 }
 
-/// Writes lines that may hold external text.
+/// Writes lines that may contain text from outside the program, and makes them printable.
 pub(crate) fn show(text: &str) {
     put(&lines(text));
 }
 
-/// Writes a line that may hold external text.
+/// Writes a line that may contain text from outside the program, and makes it printable.
 pub(crate) fn say(text: &str) {
     put(&format!("{}\n", one_line(text)));
 }

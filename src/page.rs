@@ -307,7 +307,8 @@ fn voices(of: &Of<'_>) -> Voices {
     }
 }
 
-/// Creates the function that hands the page's commands to playback. It fails if no playback is running.
+/// Creates the function that hands the page's commands to playback. The function fails if no playback is
+/// running.
 fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
     let commands = Arc::clone(commands);
     Arc::new(move |play| {

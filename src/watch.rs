@@ -339,7 +339,7 @@ impl Watch {
 /// Time shown with a state of the dive. It is the time of the state's last update, so that the same dive
 /// gives the same lines wherever ticks end.
 ///
-/// If there are no updates, it is the time of the tick.
+/// If there are no updates, the time of the tick is shown.
 fn as_of(state: &LiveState) -> MonoNs {
     state.at.filter(|_| !state.is_old()).unwrap_or(state.now)
 }

@@ -256,7 +256,7 @@ impl Senses {
     /// file's.
     ///
     /// In a symmetric section, there is a second solution: the vehicle is on the other side, and all heads
-    /// turn the opposite way. It is tried, too.
+    /// turn the opposite way. This second solution is tried, too.
     fn choose<const N: usize>(material: &Material<'_>, scan: &Scan, guesses: &[[Guess; 2]]) -> Self {
         let count = scan.heads.len();
         let cost = |mirrored: &[bool]| joint::<N>(material, scan, guesses, mirrored).cost;

@@ -327,7 +327,7 @@ impl Page {
     }
 }
 
-/// Replaces the non-ASCII characters of external text. A plus-minus sign becomes a tilde.
+/// Replaces the non-ASCII characters of text from outside the program. A plus-minus sign becomes a tilde.
 fn in_ascii(cell: &mut Cell) {
     if !cell.symbol().is_ascii() {
         let plain = if cell.symbol() == "±" { "~" } else { "?" };

@@ -96,7 +96,7 @@ pub(super) fn is_leaving() -> bool {
     LEAVING.load(Ordering::Relaxed)
 }
 
-/// Restores the settings. This takes no time, whatever the terminal does.
+/// Restores the terminal's settings. The call never blocks, even if the terminal reads nothing.
 pub(super) fn restore_settings() {
     if let Some(before) = BEFORE.get()
         && let Err(error) = tcsetattr(io::stdin(), OptionalActions::Now, before)

@@ -1,4 +1,4 @@
-//! Tests of the way from a vehicle file's table to readings, through the emulated device.
+//! Tests the path from a vehicle file's table to an A50's readings, through the emulated device.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;

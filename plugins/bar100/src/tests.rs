@@ -1,4 +1,4 @@
-//! Tests of the way from a vehicle file's table to readings, through the emulated sensor.
+//! Tests the path from a vehicle file's table to a Bar100's readings, through the emulated sensor.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;

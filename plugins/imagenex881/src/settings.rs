@@ -15,7 +15,7 @@ pub struct Mode {
     pub name: &'static str,
     /// Step between pings in counts of 0.3 degrees.
     pub step_counts: u8,
-    /// Turn period at the range setting [`TABLE_RANGE_M`], ms.
+    /// Turn period at a range setting of 10 m, ms.
     pub turn_ms: i64,
 }
 

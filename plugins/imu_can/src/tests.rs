@@ -1,4 +1,4 @@
-//! Tests of the way from a vehicle file's table to readings, through the emulated unit.
+//! Tests the path from a vehicle file's table to an inertial unit's readings, through the emulated unit.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;

@@ -1,4 +1,4 @@
-//! Tests of the way from a vehicle file's table to readings, through the emulated autopilot.
+//! Tests the path from a vehicle file's table to the readings of its sensors, through the emulated autopilot.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::codec::CodecCounts;

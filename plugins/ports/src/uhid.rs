@@ -99,7 +99,8 @@ impl<W: Write> VirtualDevice<W> {
         Ok(Self { kernel })
     }
 
-    /// Sends an input report of 1 to 4096 bytes. It begins with its id if the descriptor has report ids.
+    /// Sends an input report of 1 to 4096 bytes. The report begins with its id if the descriptor has report
+    /// ids.
     pub fn report(&mut self, report: &[u8]) -> Result<(), UhidError> {
         send(&mut self.kernel, "input report", &input(report)?)
     }

@@ -1,4 +1,4 @@
-//! Tests of the way from a vehicle file's table to readings, through the emulated counter.
+//! Tests the path from a vehicle file's table to a cable counter's readings, through the emulated counter.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;

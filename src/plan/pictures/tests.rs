@@ -1,5 +1,5 @@
-//! Checks every chart of every kind of plan. It must be well-formed and reproducible, and have the right
-//! content.
+//! Checks every chart of every kind of plan. Each chart must be well-formed and reproducible, and have the
+//! right content.
 
 use clap::Parser;
 use headrace_geometry::frames::Vec3;

@@ -100,7 +100,8 @@ pub(super) fn exchange_by_datagram(
     Ok(None)
 }
 
-/// Read timeout of a socket. It is set only when it changes, because most waits are as long as the one before.
+/// Read timeout of a socket. The timeout is set only when it changes, because most waits are as long as the
+/// previous one.
 #[derive(Default)]
 pub(super) struct ReadTimeout(Duration);
 
