@@ -37,7 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dive = app.arm(vehicle.navigation())?;
     player.connect(dive.sources());
     drive(&mut dive, &mut player, Pace::default(), &mut |_| ())?;
-    // Judges the last sections too, which stay open as long as later samples could change them.
+    // Ends the dive, which also judges the last sections. Until then they are open, because later samples
+    // could change them.
     dive.finish(&mut |_, _| ());
 
     println!("{}, target {} m", vehicle.name, vehicle.target_m);

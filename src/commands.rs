@@ -39,7 +39,7 @@ use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
 
-/// `headrace demo`.
+/// Runs `headrace demo`.
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let (name, text) = files::DEMO_SCENE;
     let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in, None)?;
@@ -106,7 +106,7 @@ fn demo_page(args: &Demo, scene: &Scene, log: &Path, dive: &Dive, in_lines: bool
     Some(served)
 }
 
-/// `headrace run`.
+/// Runs `headrace run`.
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file::read(&args.vehicle)?;
     let mut inputs = vehicle_file::files(&args.vehicle, &vehicle);
@@ -163,7 +163,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     finish(&report, &args.output)
 }
 
-/// `headrace replay`.
+/// Runs `headrace replay`.
 pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
     let given = Given::read(args.vehicle.as_deref())?;
@@ -235,7 +235,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     Ok(if differs { failure::FAILED } else { code })
 }
 
-/// Files that a player plays.
+/// Files that the replay reads.
 fn files_of_player(player: &Player) -> Vec<PathBuf> {
     player.files().iter().map(|file| file.path.clone()).collect()
 }

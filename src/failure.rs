@@ -105,7 +105,7 @@ impl Failure {
         }
     }
 
-    /// Exit code.
+    /// Exit code for this error.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Config(_)

@@ -132,7 +132,7 @@ fn live_page(
     page::serve(&args.page, of, if shows_lines { Some(&mut say) } else { None })
 }
 
-/// Text shown at the beginning of a dive.
+/// Text about ports and recordings that is shown at the beginning of a dive.
 fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
     let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
     let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
@@ -147,7 +147,7 @@ fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
 
 /// Checks that a dive can be recorded to these files.
 ///
-/// With `--force` existing files are removed. This is the last step that may fail.
+/// With `--force` existing files are removed. After this step no check can prevent the dive.
 pub(crate) fn make_room(logs: &[PathBuf], args: &Run, mut claims: Claims) -> Result<(), Failure> {
     let first = |log: &PathBuf| claims.claim_recording("--record", log, args.rotate.is_some());
     let firsts = logs.iter().map(first).collect::<Result<Vec<_>, _>>()?;
@@ -164,7 +164,7 @@ pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect,
     connect.collect()
 }
 
-/// Numbers of the required sensors.
+/// Numbers of the sensors that `--require` names.
 ///
 /// Errors: the vehicle has no sensor with the id, or a required sensor has an invalid `connect`.
 fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> {
@@ -230,7 +230,7 @@ struct SensorStates {
     words: Vec<String>,
     /// Numbers of required sensors that aren't running yet.
     required: Vec<usize>,
-    /// Deadline for the required sensors.
+    /// Time by which the required sensors must run.
     required_by: MonoNs,
     begun: MonoNs,
 }

@@ -19,8 +19,8 @@ use crate::watch::Watch;
 /// Judges the dive for each combination of the requested targets and section lengths. Returns nothing if
 /// there is only one combination.
 ///
-/// Counted visits and the times of flags depend on the target. Each combination is therefore replayed, except
-/// the one that was played already.
+/// The counted passes and the times at which sections are flagged depend on the target. Each combination is
+/// therefore replayed, except the one that was played already.
 pub(crate) fn reports(
     args: &Replay,
     files: &[PathBuf],

@@ -12,19 +12,19 @@ pub(super) struct Cable {
     step_m: Option<f64>,
     /// Standard deviation of the slack, m, and its time constant, s.
     slack: [f64; 2],
-    /// A speed, m/s. Then, at this speed, the standard deviation of a hole's diameter and the largest hole that
-    /// passes, m.
+    /// A speed, m/s, followed by the standard deviation of a hole's diameter and the largest measured hole
+    /// that passes at this speed, m.
     ///
-    /// The speed is the planned one, or else the largest one.
+    /// The speed is the planned one, or without a plan the largest that meets the target.
     at_speed: Option<[f64; 3]>,
-    /// Keys that the vehicle file doesn't have.
+    /// Keys about the cable that the vehicle file doesn't set.
     missing: Vec<String>,
 }
 
 impl Cable {
-    /// Cable accuracy. `v_max_mps` is the largest speed, m/s.
+    /// Computes the cable's accuracy. `v_max_mps` is the largest speed that meets the target, m/s.
     ///
-    /// `None` without a counter or without the filter.
+    /// Returns `None` for a vehicle without a cable counter or without the navigation filter.
     pub(super) fn of(
         vehicle: &VehicleConfig,
         text: &str,
@@ -43,7 +43,7 @@ impl Cable {
         Some(Self { step_m, slack, at_speed, missing: missing(vehicle, text) })
     }
 
-    /// Text for the summary.
+    /// Text about the cable's accuracy for the summary.
     pub(super) fn line(&self) -> String {
         let step = self.step_m.map_or("step size stated in each reading".to_owned(), |step_m| {
             format!("steps of {} mm", (step_m * 1e4).round() / 10.0)
@@ -61,7 +61,7 @@ impl Cable {
         parts.join("; ")
     }
 
-    /// JSON for programs.
+    /// The cable's accuracy as JSON.
     pub(super) fn json(&self) -> Value {
         let [slack_m, time_s] = self.slack;
         let [speed_mps, sd_m, most_m] = [0, 1, 2].map(|k| self.at_speed.and_then(|at| at.get(k).copied()));
@@ -72,7 +72,7 @@ impl Cable {
     }
 }
 
-/// Cable keys that the file doesn't have. Their defaults apply.
+/// Keys about the cable that the vehicle file doesn't set. Their defaults apply.
 fn missing(vehicle: &VehicleConfig, text: &str) -> Vec<String> {
     let Ok(root) = Document::new("", text).root() else { return Vec::new() };
     let navigation = root.section("navigation").ok().flatten();

@@ -19,7 +19,7 @@ use crate::vehicle_file;
 use cable::Cable;
 use outlook::Outlook;
 
-/// A finding, with its file and line.
+/// An error or warning, with its file and line.
 struct Found {
     grade: Grade,
     file: String,
@@ -37,7 +37,7 @@ struct Readable {
     cable: Option<Cable>,
 }
 
-/// `headrace check`.
+/// Runs `headrace check`.
 pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
     let (name, text) = (args.file.display().to_string(), files::read(&args.file)?);
     let mut found = Vec::new();

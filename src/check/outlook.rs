@@ -1,4 +1,5 @@
-//! Outlook for a vehicle file: the largest speed, the hours of a dive, and the wall that the vehicle hides.
+//! Results of planning with a vehicle file: the largest speed, the hours of a dive, and the wall that the
+//! vehicle hides.
 
 use headrace_sampling::SamplingError;
 use headrace_sampling::head::HeadMode;
@@ -7,13 +8,13 @@ use headrace_sampling::plan::{Answer, HELD_SHARE, Inspection, Planner, Question,
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
 
-/// Plan for a file as it is. The vehicle is on the tunnel's axis.
+/// Plan for the vehicle as its file describes it. The vehicle is assumed to be on the tunnel's axis.
 pub(super) struct Outlook {
     /// The planner's answer for the mode that all heads have; `None` if their modes differ.
     own: Option<Answer>,
-    /// The planner's answer with the largest speed.
+    /// The planner's answer for the mode with the largest speed.
     best: Option<Answer>,
-    /// Largest speed, m/s, if the heads are set in phase for the planned speed.
+    /// Largest speed, m/s, if the heads' start angles are those for the planned speed.
     ///
     /// `None` if no speed is planned, or if the heads' modes differ.
     as_started_mps: Option<f64>,
@@ -33,7 +34,7 @@ const TOLD_APART: f64 = 0.02;
 const SAME: f64 = 1e-6;
 
 impl Outlook {
-    /// Outlook for the vehicle's heads, with the position errors between passes that its sensors leave.
+    /// Plans for the vehicle's heads, with the expected position errors between passes.
     ///
     /// `None` without heads.
     ///
@@ -88,7 +89,7 @@ impl Outlook {
         }))
     }
 
-    /// Largest speed in the heads' own mode, m/s.
+    /// Largest speed in the mode to which all heads are set, m/s.
     pub(super) fn v_max_mps(&self) -> Option<f64> {
         self.own.as_ref().and_then(|own| own.v_max_mps)
     }
@@ -119,7 +120,7 @@ impl Outlook {
         found
     }
 
-    /// Text for the summary.
+    /// Text about the plan for the summary.
     pub(super) fn lines(&self) -> Vec<String> {
         let speed = |answer: &Answer| match (answer.v_max_mps, answer.needed_h, &answer.refused) {
             (Some(v_max_mps), Some(hours), _) => {
@@ -180,7 +181,7 @@ impl Outlook {
         }
     }
 
-    /// JSON for programs.
+    /// The plan as JSON.
     pub(super) fn json(&self) -> Value {
         let answer = |answer: &Answer| {
             json!({

@@ -22,9 +22,9 @@ use crate::failure::Failure;
 use crate::files;
 use crate::vehicle_file;
 
-/// Kind of the heads if there is no vehicle file.
+/// Plugin of the heads that are assumed without a vehicle file.
 const USUAL_HEAD: &str = "imagenex881";
-/// Range setting of these heads, m. Source: the maker's table of modes.
+/// Range setting of the heads that are assumed without a vehicle file, m. Source: the maker's table of modes.
 const USUAL_RANGE_M: f64 = 10.0;
 
 /// An inspection to be planned, with the names of its parts.
@@ -36,7 +36,7 @@ pub(super) struct Case {
     pub(super) question: Question,
     /// Expected position errors; `None` without a vehicle file.
     pub(super) errors: Option<ExpectedErrors>,
-    /// Files that the inspection was read from.
+    /// Files from which the inspection was read.
     pub(super) inputs: Vec<PathBuf>,
 }
 
@@ -168,7 +168,7 @@ fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
     Ok(TunnelConfig::from_section(&root, load)?)
 }
 
-/// Heads of a vehicle, with the range setting `range_m`, if given.
+/// Heads of a vehicle, each with its modes. `range_m` overrides the range setting.
 fn heads_of(path: &Path, sensors: &[Box<dyn Device>], range_m: Option<f64>) -> Result<Vec<Head>, Failure> {
     let mut heads = Vec::new();
     for sensor in sensors {
@@ -197,7 +197,7 @@ fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
             mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
             latency: DurNs::ZERO,
         };
-        // The plan covers all modes, so any mode will do here.
+        // The plan covers all modes of the head, so the mode set here has no effect.
         let own = Document::new("plan", "mode = \"slow\"").root()?;
         let device = kind.configure(&config, &own)?;
         let mut heads = heads_of(Path::new("plan"), &[device], Some(range_m))?;
@@ -206,22 +206,23 @@ fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
     (0..args.heads).map(head).collect()
 }
 
-/// Results of one planning run, with its input.
+/// Results of one run of `headrace plan`, with its input.
 pub(super) struct Findings {
     pub(super) planner: Planner,
     /// Ids of the heads.
     pub(super) heads: Vec<String>,
     pub(super) tunnel: String,
-    /// Range setting, m.
+    /// Range setting of the heads, m.
     pub(super) range_m: f64,
-    /// Shortest and longest part of the perimeter that a beam covers, m.
+    /// Shortest and longest footprint of a beam along the perimeter, m.
     pub(super) footprints_m: [f64; 2],
     pub(super) question: Question,
     pub(super) answers: Vec<Answer>,
-    /// Mode for the briefing and the charts, with its speed, m/s; `None` if no mode gives a speed.
+    /// Index of the mode shown in the briefing and the charts, and its speed, m/s; `None` if no mode gives a
+    /// speed.
     pub(super) shown: Option<(usize, f64)>,
     pub(super) briefing: Briefing,
-    /// Gain in speed with the heads in one line along the hull, if it is worth reporting.
+    /// Gain in speed if the heads were in one line along the hull; `None` if the gain isn't worth reporting.
     pub(super) in_line: Option<InLine>,
 }
 

@@ -19,7 +19,7 @@ use crate::outputs::{self, Claims, Kind, PICTURE};
 use case::{Case, Findings, printed_mps};
 use pictures::Shown;
 
-/// `headrace plan`.
+/// Runs `headrace plan`.
 pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
     let case = Case::of(args)?;
     if let Some(folder) = &args.svg {
@@ -93,7 +93,7 @@ fn in_line(planner: &Planner, question: &Question) -> Result<Option<InLine>, Sam
     Ok(planner.in_line(target_m)?.filter(gains))
 }
 
-/// Whether a mode meets the request.
+/// Whether any mode meets the requested target, speed and hours.
 fn is_met(answer: &Answer) -> bool {
     answer.meets_target.unwrap_or(answer.refused.is_none())
         && answer.spacing.is_some_and(|spacing| spacing.t_max_m.is_some())

@@ -20,7 +20,7 @@ const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
 /// Header without identifying data.
 pub(crate) struct Anonymous {
     vehicle_toml: String,
-    /// Old and new names of attachments.
+    /// Old and new name of each attached file.
     names: Vec<(String, String)>,
     /// Messages that list the items that couldn't be removed.
     pub(crate) left: Vec<String>,
@@ -91,7 +91,8 @@ fn ending(name: &str) -> &str {
     name.rfind('.').and_then(|dot| name.get(dot..)).unwrap_or_default()
 }
 
-/// A `connect` with the same carrier, but without identifying parts. `number` makes the results distinct.
+/// A value of `connect` with the same carrier, but without identifying parts. `number` makes the results
+/// distinct.
 fn connect(text: &str, number: usize) -> String {
     // Addresses reserved for documentation. Source: RFC 5737.
     let host = |address: &str| {
@@ -156,7 +157,7 @@ fn string_len(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// Key whose value follows `text`. The names of the tables before it are left out.
+/// TOML key whose value follows `text`, without the names of its tables.
 fn key_before(text: &str) -> &str {
     let line = text.rsplit(['\n', ',', '{', '[']).next().unwrap_or_default();
     let key = line.split_once('=').map_or("", |(key, _)| key);

@@ -7,7 +7,7 @@ use headrace_replay::playback::PlaybackCommand;
 pub(crate) enum Mode {
     /// A dive on ports. No thread may wait.
     Live,
-    /// A simulated dive.
+    /// The simulated dive of `headrace demo`.
     Demo,
     /// A dive from a log, at the playback's speed.
     Source,

@@ -10,12 +10,13 @@ use crate::report::{Against, Velocity};
 const DELAY_US: i64 = 100_000;
 /// Device clock at power-on, microseconds since 1970.
 const BEGINS_US: i64 = 1_638_191_471_000_000;
-/// Altitude, m. It is constant, because the emulator has no model of the surface that the beams meet.
+/// Reported altitude, m. It is constant, because the emulator has no model of the surface that the beams
+/// meet.
 const ALTITUDE_M: f64 = 1.0;
-/// Alternating figures of merit, because the decoder withholds identical reports as repeats.
+/// Figures of merit, sent in turn, because the decoder withholds identical reports as repeats.
 const FOMS_MPS: [f64; 2] = [0.001, 0.001_1];
 
-/// Settings of the emulated device.
+/// Settings of the emulated A50.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
     /// Report rate, Hz.

@@ -128,12 +128,12 @@ fn all_finite<const N: usize>(values: [f64; N]) -> Option<[f64; N]> {
     values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
-/// Value of a 32-bit device clock.
+/// Value of a device's 32-bit clock after this time.
 fn wrapped(ticks: i64) -> u32 {
     u32::try_from(ticks.rem_euclid(1 << 32)).unwrap_or_default()
 }
 
-/// Nearest count within the wire's range.
+/// Counts nearest to these values, within the range of the wire format.
 fn counts<const N: usize>(values: [f64; N], quantum: f64) -> Option<[i16; N]> {
     let counts = |value| {
         let counts = math::round_to_i64(value / quantum);

@@ -29,8 +29,8 @@ fn wrong(seed: u64) -> [Wrong; 2] {
     ]
 }
 
-/// Angles, relative positions and senses of rotation are correct within three of the stated standard
-/// deviations.
+/// Estimated angles, relative positions and senses of rotation of heads are correct within three of the
+/// stated standard deviations.
 ///
 /// The standard deviations are as small as a survey needs.
 #[test]
@@ -149,7 +149,7 @@ fn zeros_of_cable_counter_surface_and_water_level_are_exact() {
 /// Further turns see the same roughness of the wall. Their returns share the weight, so each piece of wall
 /// counts once.
 #[test]
-fn each_piece_of_wall_counts_once() {
+fn further_turns_add_no_weight_to_a_piece_of_wall() {
     let stand = Stand { seconds: 100, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };
     stand.ask(|material| {
         let still = longest(material).unwrap();

@@ -13,7 +13,7 @@ const STEP: f64 = 1e-6;
 /// hit different walls. Derivatives with respect to rotations are exact only at zero rotation, because
 /// rotations are assumed to be small.
 #[test]
-fn every_derivative_matches_central_differences() {
+fn every_range_derivative_matches_central_differences() {
     for (name, profile) in profiles() {
         let wrong = [Wrong::default(), Wrong { is_mirrored: true, ..Wrong::default() }];
         let stand = Stand::new(profile, &wrong, 1);

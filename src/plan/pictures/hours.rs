@@ -13,7 +13,7 @@ use super::modes::{self, Mode};
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
 /// Ratio of successive speeds along a curve.
 const FASTER: f64 = 1.02;
-/// Number of points at which the fastest mode is determined.
+/// Number of values of T at which the fastest mode is determined.
 const LEAST: u32 = 300;
 /// Style of the band under the mode that takes the least time.
 const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::T };
@@ -21,7 +21,7 @@ const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::
 /// The spacing T that the chart marks, and the hours that every mode takes for it.
 struct Sought {
     t_m: f64,
-    /// Hours, by mode.
+    /// Hours for the whole length, by mode.
     hours: Vec<Option<f64>>,
 }
 
@@ -72,13 +72,13 @@ fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
         Some(target_m) => target_m,
         None => shown.planner.t_max_m(shown.mode, shown.asked_mps().unwrap_or(shown.speed_mps))?,
     };
-    // Without a finite T, the chart has text in place of curves, and any axis will do.
+    // Without a finite T, the chart has text in place of curves, so the end of its axis has no effect.
     let t_m = if t_m.is_finite() { t_m } else { 1.0 };
     let hours = |mode: &Mode| Some(length_m / shown.planner.v_max_mps(mode.number, t_m).ok()? / 3600.0);
     Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
 }
 
-/// Upper ends of the x and y axes.
+/// Upper ends of the chart's axes: the spacing T, m, and the hours.
 fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let all = || sought.hours.iter().flatten().copied();
@@ -96,7 +96,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     Ok([(1.3 * reached_m).max(2.2 * sought.t_m), (3.0 * shown_h).max(1.3 * asked_h)])
 }
 
-/// Draws the legend of the band.
+/// Draws the legend of the band that marks the fastest mode.
 fn legend(chart: &Chart<'_>) {
     let [x, y] = [FRAME.right - 10.0, FRAME.top + 12.0];
     chart.canvas.line(&[[x - 40.0, y], [x, y]], &BAND);

@@ -14,7 +14,7 @@ use super::modes;
 use super::wall::{self, Thin};
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
-/// Points around the wall at which spacing is computed.
+/// Number of points around the wall at which the spacing is computed.
 const PLACES: usize = 720;
 const FEWER: Colour = Colour(236, 241, 246);
 const UNSEEN: Colour = Colour(214, 214, 214);
@@ -109,7 +109,7 @@ fn note(shown: &Shown<'_>, around: &Around) -> String {
     format!("The plan uses T = {} m: {why}{allowed}.", short(counted_m))
 }
 
-/// Text about the tolerances that the plan allows for.
+/// Text about the drift, yaw and yaw rate that the plan allows for.
 fn allowed(shown: &Shown<'_>) -> String {
     let inspection = shown.planner.inspection();
     let drift = (inspection.drift_m > 0.0).then(|| format!("{} m of drift", inspection.drift_m));
@@ -149,11 +149,12 @@ fn shade(chart: &Chart<'_>, stretch: &Thin) {
     }
 }
 
-/// Draws a second row of labels: positions as clock hours.
+/// Draws a second row of axis labels: positions on the wall as clock hours.
 fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     let y = chart.frame.bottom + 34.0;
     let mut taken: Vec<[f64; 2]> = Vec::new();
-    // The floor, the walls and the crown are labelled first, then the hours between them if there is room.
+    // The floor, the walls and the crown are labelled first. The hours between them are labelled if there is
+    // room.
     let (named, between): (Vec<&Hour>, Vec<&Hour>) = hours.iter().partition(|hour| !hour.place.is_empty());
     for hour in named.into_iter().chain(between) {
         let x = chart.px([hour.arc_m, 0.0])[0];
@@ -167,8 +168,8 @@ fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     }
 }
 
-/// Draws captions above the thin stretches, which fewer heads see. A caption states the number of these
-/// heads.
+/// Writes captions above the stretches of wall that fewer heads see. A caption states how many heads see the
+/// stretch.
 fn captions(chart: &Chart<'_>, stretches: &[Thin]) {
     let mut last: Option<(f64, [String; 2])> = None;
     for stretch in stretches {
@@ -252,7 +253,7 @@ fn line(chart: &Chart<'_>, places: &[WallPlace], of: impl Fn(&WallPlace) -> Opti
     }
 }
 
-/// Runs of neighbouring points that have a value.
+/// Splits a curve into runs of neighbouring points that have a value.
 fn runs<V>(places: &[WallPlace], of: impl Fn(&WallPlace) -> Option<V>) -> Vec<Vec<(f64, V)>> {
     let mut runs = vec![Vec::new()];
     for place in places {

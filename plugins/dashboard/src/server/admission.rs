@@ -16,18 +16,18 @@ use super::places::Place;
 use super::reply::{ask_to_wait, plain, refused};
 use crate::access::{Role, tokens_of};
 
-/// Maximum number of wrong tokens remembered, in total and per client.
+/// Maximum number of wrong tokens whose hashes are remembered, in total and per client.
 const MOST_WRONG: usize = 256;
 const MOST_WRONG_OF_CLIENT: usize = 4;
 
-/// Connection that a request arrived on.
+/// Connection on which a request arrived.
 #[derive(Clone)]
 pub(super) struct Caller {
     pub(super) peer: IpAddr,
     pub(super) place: Arc<Place>,
 }
 
-/// A request that may see the dive.
+/// A request that may see the dive, with its role and client.
 pub(super) struct Admitted {
     pub(super) role: Role,
     pub(super) client: Client,
@@ -41,7 +41,7 @@ pub(super) struct Admitted {
 pub(super) enum Denied {
     /// The request has no token, or only wrong ones.
     NoToken,
-    /// The client has sent too many wrong tokens, so its token isn't compared.
+    /// The client has sent too many wrong tokens, so the request's token isn't compared.
     Spent,
 }
 
@@ -141,8 +141,8 @@ fn hash_of(token: &str) -> u64 {
 impl Shared {
     /// Returns the highest role among these tokens.
     ///
-    /// Each wrong token uses one guess of the client's budget. Two kinds of tokens are free: a right token already
-    /// shown on this connection, and a wrong token that is still remembered.
+    /// Each wrong token uses one guess of the client's budget. Two kinds of tokens use no guess: a right
+    /// token already shown on this connection, and a wrong token that is still remembered.
     fn role(&self, client: Client, place: &Place, tokens: &BTreeSet<String>) -> Result<Role, Denied> {
         if self.access.tokens.is_none() {
             return Ok(Role::Operator);

@@ -39,12 +39,12 @@ use crate::site::Site;
 pub const PORT: u16 = 8881;
 /// Number of ports tried, beginning with the requested port.
 const PORTS: u16 = 10;
-/// Maximum number of batches that a viewer may lag behind. Beyond that it gets all changes at once.
+/// Maximum number of message batches that a viewer may lag behind. Beyond that it gets all changes at once.
 const BATCHES: usize = 64;
 /// Budget of wrong tokens for a client: burst, and refill per second.
 const MOST_GUESSES: f64 = 20.0;
 const GUESSES_PER_S: f64 = 1.0;
-/// Time for viewers to receive the last messages.
+/// Time limit for viewers to receive the last messages when the page ends.
 const ENDS_WITHIN: Duration = Duration::from_secs(1);
 
 /// Files with certificate and key, in PEM format.
@@ -82,10 +82,10 @@ pub enum PageError {
     Bind {
         /// Requested address.
         address: SocketAddr,
-        /// Error of the last attempt.
+        /// Error of the last port tried.
         source: io::Error,
     },
-    /// The thread or runtime can't be started.
+    /// The page's thread or its async runtime can't be started.
     #[error("the page's thread can't be started: {0}")]
     Thread(io::Error),
     /// TLS can't be set up.
@@ -98,7 +98,7 @@ pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
 /// Handler that logs the recording of a voice note and then notifies the loop. Its error is the reason for a
 /// refusal.
 pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
-/// Finds in a log the recording of the note with this id and time, seconds.
+/// Handler that finds in a log the recording of the voice note with this id and time, seconds.
 ///
 /// Returns `None` if the log has no readable recording of it. The search may take seconds.
 pub type Recall = Arc<dyn Fn(u32, f64) -> Result<Option<Voice>, String> + Send + Sync>;
@@ -114,7 +114,7 @@ pub enum Voices {
     Recalled(Recall),
 }
 
-/// Handler of commands to playback.
+/// Handler of commands to playback. Its error is the reason for a refusal.
 pub type Direct = Arc<dyn Fn(Play) -> Result<(), String> + Send + Sync>;
 
 /// Counters that `/metrics` reports.
@@ -130,7 +130,7 @@ pub(crate) struct Counts {
     pub(crate) bytes: AtomicU64,
 }
 
-/// State shared by the handlers.
+/// State shared by all handlers of requests.
 pub(crate) struct Shared {
     model: Mutex<Model>,
     pub(crate) access: Access,

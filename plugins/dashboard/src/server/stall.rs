@@ -13,7 +13,7 @@ use tokio::time::{Sleep, sleep};
 use super::Shared;
 use super::places::Place;
 
-/// Time without accepted data after which a peer is dropped.
+/// Time after which a peer that accepts no data is dropped.
 pub(super) const STALLED_AFTER: Duration = Duration::from_secs(10);
 
 /// A TCP stream whose writes fail after [`STALLED_AFTER`] without progress.

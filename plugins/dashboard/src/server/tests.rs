@@ -15,7 +15,7 @@ use crate::site::Mode;
 const VIEWER: &str = "Authorization: Bearer viewer-0123456789\r\n";
 const OPERATOR: &str = "Authorization: Bearer operator-01234567\r\n";
 
-/// A page with tokens, and the number of commands that the page has passed on.
+/// A page that requires tokens, and the number of commands that it has passed to the loop.
 struct Served {
     page: Page,
     commands: Arc<AtomicU32>,
@@ -226,7 +226,7 @@ fn unread_streams_are_dropped_after_10_s_without_progress() {
     let began = Instant::now();
     let mut dropped = Vec::new();
     while dropped.len() < 2 && began.elapsed() < Duration::from_secs(40) {
-        // About the data rate of a dive with four heads.
+        // The messages have about the data rate of a dive with four heads.
         served.feed(4400);
         std::thread::sleep(Duration::from_millis(200));
         while (dropped.len() as u64) < served.count(|counts| &counts.stalled) {
@@ -325,7 +325,7 @@ fn guesses_through_a_declared_proxy_count_for_the_forwarded_address() {
 }
 
 #[test]
-fn flood_gets_at_most_26_guesses_in_5_s() {
+fn flood_of_wrong_tokens_gets_at_most_26_guesses_in_5_s() {
     let served = served(&[]);
     let began = Instant::now();
     let (mut guesses, mut requests) = (0_u32, 0_u32);

@@ -24,11 +24,11 @@ const MOST_BEGUN: usize = 32;
 /// Maximum size of recordings kept in memory for playing, bytes. The oldest are dropped from memory but stay in the
 /// log.
 const MOST_HELD_BYTES: usize = 16 << 20;
-/// Maximum number of recordings received at the same time.
+/// Maximum number of recordings that are uploaded at the same time.
 const MOST_COMING: usize = 2;
-/// Budget of uploads: burst, and refill per second.
+/// Budget of recordings' uploads: burst, and refill per second.
 const RATE: (f64, f64) = (8.0, 0.2);
-/// Timeout of an upload: 512 KiB at 10 kB/s.
+/// Timeout of a recording's upload: 512 KiB at 10 kB/s.
 const COMES_WITHIN: Duration = Duration::from_mins(1);
 
 /// Voice notes that wait for their recording, and recordings kept in memory.
@@ -116,7 +116,7 @@ impl Desk {
     /// Returns the recording of a note, from memory or from the log.
     async fn recall(&self, id: u32, at_s: f64) -> Result<Option<Arc<Voice>>, Refusal> {
         let Voices::Recalled(recall) = &self.to else { return Ok(self.get(id)) };
-        // Only one search at a time, because each may read much of a log.
+        // Only one search runs at a time, because each may read much of a log.
         let _turn = self.recalling.acquire().await;
         if let Some(voice) = self.get(id) {
             return Ok(Some(voice));

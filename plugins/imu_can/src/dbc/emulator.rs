@@ -21,7 +21,7 @@ pub struct DbcEmulator {
     told: u64,
 }
 
-/// A frame of a sample: identifier, length and multiplexer value.
+/// A kind of frame that each sample has: identifier, length and multiplexer value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Frame {
     id: CanId,
@@ -54,7 +54,7 @@ impl DbcEmulator {
         DurNs::from_secs_f64(sample as f64 / self.rate_hz)
     }
 
-    /// Values of all signals.
+    /// Values of all mapped signals for this motion.
     fn values(&self, motion: &Inertia) -> Vec<(Place, f64)> {
         let axes = self.mapping.axes;
         let mut values = Vec::new();
@@ -77,7 +77,7 @@ impl DbcEmulator {
         values
     }
 
-    /// Encodes a frame; `None` if one of the frame's values is not finite, which means not measured.
+    /// Encodes a frame; `None` if one of its values isn't finite, because it wasn't measured.
     fn frame(&self, frame: Frame, values: &[(Place, f64)], elapsed: DurNs) -> Option<CanFrame> {
         let there = |place: &Place| {
             place.id == frame.id && place.switch.is_none_or(|(_, on)| Some(on) == frame.switch)

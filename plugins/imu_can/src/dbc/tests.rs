@@ -47,7 +47,7 @@ rate_valid = { signal = "ImuStatus", mask = 0x2E1 }
 sample_time = "ImuTime"
 "#;
 
-/// Further content of DBC files of whole vehicles.
+/// DBC text with the further content that files of whole vehicles have.
 const RICH: &str = "VERSION \"1\"\n\nNS_ :\n\tNS_DESC_\n\tCM_\n\tBA_DEF_\n\nBS_:\n\nBU_: U H\n\
 VAL_TABLE_ OnOff 1 \"on\" 0 \"off\" ;\n\n\
 BO_ 2147483748 A: 8 U\n SG_ Rate : 7|16@0- (0.01,-1) [-10|10] \"deg/s\" Vector__XXX\n\
@@ -195,7 +195,7 @@ proptest! {
         }
     }
 
-    /// Numeric fields have out-of-range numbers.
+    /// The numeric fields of a valid DBC text are replaced by out-of-range numbers.
     #[test]
     fn arbitrary_numbers_are_parsed_without_a_panic(
         id: u64, bytes: u64, start: u64, size: u64, order in 0_u8..2, factor in any::<f64>(), mux in 0_u64..5,
@@ -311,7 +311,7 @@ fn worked_examples_of_other_makers_are_decoded() {
 }
 
 #[test]
-fn other_dbc_content_is_ignored() {
+fn dbc_content_other_than_signals_is_ignored() {
     let dbc = DbcFile::parse(&format!("\u{FEFF}{}", RICH.replace('\n', "\r\n"))).unwrap();
     let place = dbc.signal("Rate").unwrap().place;
     assert_eq!(place.id, CanId::Extended(100));

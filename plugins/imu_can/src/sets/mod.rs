@@ -16,7 +16,7 @@ pub struct MessageError {
     pub id: CanId,
     /// Length of the frame.
     pub len: usize,
-    /// Required length.
+    /// Length that the frame must have.
     pub needed: usize,
 }
 

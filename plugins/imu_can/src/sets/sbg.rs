@@ -42,16 +42,16 @@ impl ImuStatus {
     }
 }
 
-/// One message, in the device's axes.
+/// One message of the SBG set, in the device's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
     /// Header of an inertial sample.
     ImuInfo {
         /// Time since power-on, microseconds.
         time_us: u32,
-        /// Status bits.
+        /// Status bits of the unit.
         status: ImuStatus,
-        /// Temperature.
+        /// Temperature of the unit.
         temperature: i16,
     },
     /// Specific force.
