@@ -38,7 +38,7 @@ pub trait Fault: Send {
     }
 }
 
-/// No fault.
+/// A line without faults.
 pub struct Healthy;
 
 impl Fault for Healthy {}
@@ -83,7 +83,7 @@ impl End {
         Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
     }
 
-    /// An end on the line of the previous sensor, whose own end is `other`.
+    /// A device's end that shares the line of the previous sensor; `other` is that sensor's end.
     pub fn beside(other: &Self) -> Self {
         Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
     }
@@ -93,19 +93,19 @@ impl End {
         self.beside
     }
 
-    /// Whether the end is a serial port.
+    /// Whether the line is a serial port.
     pub fn is_pseudoterminal(&self) -> bool {
         self.link.is_some()
     }
 
-    /// Returns the same end, not plugged in yet.
+    /// Returns the same end of the line, with the device not plugged in yet.
     #[must_use]
     pub fn absent(mut self) -> Self {
         self.unplug();
         self
     }
 
-    /// Address that the host opens.
+    /// Address that the host opens to reach the device.
     pub fn connect(&self) -> &Connect {
         &self.connect
     }
@@ -129,12 +129,12 @@ impl End {
     }
 }
 
-/// Controls and counters of a device under test.
+/// Controls and counters of an emulated device in a test.
 #[derive(Default)]
 pub struct Control {
     unplugged: AtomicBool,
     silent: AtomicBool,
-    /// Whether the device is silent.
+    /// Whether the device sends nothing.
     quiet: AtomicBool,
     gone: AtomicBool,
     healed: AtomicBool,
@@ -184,14 +184,14 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// Sends a whole frame.
+    /// Sends a whole frame to the host and counts it.
     pub fn whole(&mut self, frame: &[u8]) {
         self.part(frame);
         let called = self.end.stand.as_ref().is_some_and(EmulatedPort::is_called);
         self.control.whole.fetch_add(u64::from(called), Ordering::SeqCst);
     }
 
-    /// Sends bytes that aren't a whole frame.
+    /// Sends bytes to the host that aren't a whole frame, so they aren't counted.
     pub fn part(&mut self, bytes: &[u8]) {
         if let Some(stand) = &mut self.end.stand {
             stand.write(bytes).unwrap();
@@ -226,7 +226,7 @@ impl Faulty {
         Self { control, thread: Some(thread) }
     }
 
-    /// Controls of this line.
+    /// Controls and counters of the devices on this line.
     pub fn control(&self) -> &Control {
         &self.control
     }

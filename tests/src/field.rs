@@ -13,28 +13,28 @@ use crate::tracking::{self, Track};
 /// Time of a head's turn in mode SLOW, s.
 pub const TURN_S: f64 = 21.6;
 
-/// Root mean squares of a dive's errors.
+/// Root mean squares of the navigation errors in a dive.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Figures {
-    /// Across the tunnel, m.
+    /// Position error across the tunnel, m.
     pub across_m: f64,
-    /// Vertical, m.
+    /// Vertical position error, m.
     pub up_m: f64,
-    /// Chainage, m.
+    /// Chainage error, m.
     pub along_m: f64,
-    /// Displacement during one turn of a head, m.
+    /// Error of the vehicle's displacement during one turn of a head, m.
     pub turn_m: f64,
-    /// Reported standard deviation of that displacement, m.
+    /// Reported standard deviation of the displacement during one turn of a head, m.
     pub turn_arc_m: f64,
-    /// Heading, degrees.
+    /// Heading error, degrees.
     pub yaw_deg: f64,
-    /// Roll and pitch together, degrees.
+    /// Errors of roll and pitch together, degrees.
     pub tilt_deg: f64,
     /// Share of pings with a fix, 0 to 1.
     pub fixed: f64,
 }
 
-/// Root mean square; 0 without values.
+/// Root mean square of the values; 0 without values.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (mut n, mut sum) = (0.0, 0.0);
     for value in values {
@@ -130,7 +130,7 @@ pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Sc
     scenes::seeded(&shorter, &load, Some(seed))
 }
 
-/// Degrees of freedom of a pose.
+/// Indices of the pose's six degrees of freedom in the filter's error state.
 pub const POSE: [usize; 6] = [0, 1, 2, 6, 7, 8];
 
 /// Normalised estimation error squared (NEES) of the pose.

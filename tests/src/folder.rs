@@ -28,7 +28,7 @@ fn built() -> PathBuf {
 /// bare file names.
 pub struct Folder(PathBuf);
 
-/// Result of a command.
+/// Result of a run of the program.
 pub struct Answer {
     /// Exit code; `None` if a signal ended the program.
     pub code: Option<i32>,
@@ -67,7 +67,7 @@ impl Folder {
         std::fs::write(self.path(name), content).unwrap();
     }
 
-    /// Content of a file in this folder.
+    /// Reads a file in this folder.
     pub fn read(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.path(name)).unwrap()
     }
@@ -132,7 +132,7 @@ impl Folder {
         (answer.code, report)
     }
 
-    /// Digest of a replay without findings.
+    /// Digest of the results of a log's replay, which must report no loss or other finding.
     pub fn digest(&self, log: &str, further: &[&str]) -> String {
         let (code, report) = self.replay(log, further);
         assert_eq!(code, Some(0), "{log} {further:?}: {:?}", report["log"]["losses"]);

@@ -18,12 +18,12 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::scenes;
 
-/// A return with its place on the wall.
+/// A sonar return with its place on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Chainage and arc length, m.
     pub place: [f64; 2],
-    /// The same place in the tunnel's frame, m.
+    /// Place of the return in the tunnel's frame, m.
     pub point: [f64; 3],
 }
 
@@ -40,9 +40,9 @@ pub struct Ping {
     pub single_step: bool,
     /// Pose of the vehicle, if known.
     pub pose: Option<Pose>,
-    /// The return, if it was accepted as wall and placed.
+    /// The ping's return, if the loop accepted it as wall and placed it.
     pub sample: Option<Sample>,
-    /// The return, if it was not accepted as wall.
+    /// The ping's return, if the loop did not accept it as wall.
     pub doubtful: Option<Sample>,
 }
 
@@ -52,7 +52,7 @@ pub struct Dive {
     pub pings: Vec<Ping>,
     /// Report of the dive.
     pub report: Report,
-    /// Cross-section in the loop's configuration.
+    /// Cross-section of the tunnel in the loop's configuration.
     pub profile: Profile,
     /// Mounts of the heads, by number.
     pub mounts: Vec<Mount>,
@@ -63,12 +63,12 @@ pub struct Dive {
 }
 
 impl Dive {
-    /// All samples, in order.
+    /// All samples of the dive, in order.
     pub fn samples(&self) -> impl Iterator<Item = &Sample> {
         self.pings.iter().filter_map(|ping| ping.sample.as_ref())
     }
 
-    /// Samples of some heads: chainage and arc length, m.
+    /// Samples of the selected heads: chainage and arc length, m.
     pub fn samples_of(&self, is_one: impl Fn(usize) -> bool) -> impl Iterator<Item = [f64; 2]> {
         self.pings.iter().filter(move |ping| is_one(ping.head)).filter_map(|ping| Some(ping.sample?.place))
     }
@@ -79,7 +79,7 @@ struct Seen {
     pings: Vec<Ping>,
     /// Place of every return. The loop may decide later whether the return is from the wall or doubtful.
     placed: Vec<Option<[f64; 3]>>,
-    /// Source of each ping.
+    /// Source (number of the sensor) of each ping.
     sources: Vec<SourceId>,
 }
 

@@ -20,9 +20,9 @@ pub use knowing::UpperBound;
 pub use matrix::Matrix;
 pub use remedy::remedies;
 
-/// Sections this near to the ends of the trajectory are left out, m, because they always fail.
+/// Sections within this distance of the ends of the trajectory are ignored, m, because they always fail.
 const END_M: f64 = 2.0;
-/// Failed sections this near to each other form one stretch, m.
+/// Failed sections within this distance of each other form one stretch, m.
 const JOIN_M: f64 = 0.5;
 
 /// A hole up to this multiple of the target counts as close to the target.
@@ -36,11 +36,11 @@ pub type Right = Vec<Vec<Cause>>;
 pub struct Judged {
     /// Chainage of the section's start and end, m.
     pub ends_m: [f64; 2],
-    /// Sets of causes that are right.
+    /// Sets of causes that count as right.
     pub right: Right,
     /// Displayed causes, sorted.
     pub told: Vec<Cause>,
-    /// Number of the section's run.
+    /// Number of the run of sections to which the section belongs.
     pub run: Option<u32>,
     /// Diameter of the hole, m.
     pub hole_m: f64,
@@ -67,9 +67,9 @@ impl Judged {
 
 /// A dive with its failed sections.
 pub struct InterventionDive {
-    /// The drawn dive, with its final target.
+    /// The dive as drawn from its seed, with its final target.
     pub drawn: Drawn,
-    /// Report with all injected causes.
+    /// Report of the dive with all injected causes.
     pub report: Report,
     /// Failed sections that the injected causes can explain.
     pub sections: Vec<Judged>,
@@ -94,7 +94,7 @@ impl Stretch<'_> {
             .unwrap_or(&[])
     }
 
-    /// Number of runs in which the stretch is displayed.
+    /// Number of displayed runs over which the stretch is spread.
     pub fn runs(&self) -> usize {
         let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
         runs.sort_unstable();
@@ -166,12 +166,12 @@ fn hole_at_m(report: &Report, start_m: f64) -> f64 {
     same.and_then(|same| same.hole_m).unwrap_or(f64::INFINITY)
 }
 
-/// Displayed causes of a section, sorted.
+/// Displayed causes in a section's evidence, sorted.
 fn told(evidence: &Evidence) -> Vec<Cause> {
     evidence.causes.iter().collect()
 }
 
-/// Right sets of causes; `None` if the section fails even without all injected causes.
+/// Sets of causes that count as right for a section; `None` if the section fails even without all injected causes.
 fn right(drawn: &Drawn, alone: &[bool], together: bool) -> Option<Right> {
     if !together {
         return None;
@@ -218,7 +218,7 @@ pub fn kinds(seed: u64) -> Vec<usize> {
     if number.is_multiple_of(2) {
         return vec![number / 2 % KINDS.len()];
     }
-    // All pairs of causes take turns.
+    // Dives with two causes take all pairs of causes in turn.
     let pairs: Vec<[usize; 2]> =
         (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
     pairs[number / 2 * 17 % pairs.len()].to_vec()

@@ -25,7 +25,8 @@ fn figure(line: &Value, key: &str) -> f64 {
     line[key].as_f64().unwrap_or_else(|| panic!("{key} of {line}"))
 }
 
-/// Displayed conditions between two chainages in one direction, without the seconds after the vehicle turns.
+/// Displayed conditions (such as "too_fast") between two chainages while the vehicle moves in one direction. The
+/// seconds after a reversal are left out.
 fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
     let states = of(lines, "state");
     let within = |state: &&&Value| {
@@ -80,7 +81,8 @@ fn too_fast_is_not_raised_over_wall_with_a_pass_or_while_reversing() {
     assert!(back.len() > 5 && back.iter().all(|condition| *condition == "going_back"), "{back:?}");
 }
 
-/// The limit returns early enough for the pilot to slow down before new wall.
+/// When the vehicle goes forward again, the speed limit is displayed early enough for the pilot to slow down before the
+/// heads reach unsampled wall.
 #[test]
 fn speed_limit_returns_before_the_heads_reach_new_wall() {
     let lines = told(

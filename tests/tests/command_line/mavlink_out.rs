@@ -48,7 +48,7 @@ fn text_of(bytes: &[u8]) -> String {
     String::from_utf8(bytes[..end].to_vec()).unwrap()
 }
 
-/// All messages of a replay, and the digest of the replay.
+/// All MAVLink messages that a replay sends, and the digest of the replay's results.
 fn heard(log: &str) -> (Vec<Said>, String) {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();

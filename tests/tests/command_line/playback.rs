@@ -76,7 +76,7 @@ fn interrupted_demonstration_keeps_its_report_and_summary() {
     let folder = Folder::new();
     let mut screen = Screen::run(&folder, &["demo", "--speed", "20x", "--out", "demo"], 100, &[]);
     screen.until("m/s");
-    // A wrapper sends the signal to the program first and then to its process group.
+    // A wrapper such as `timeout` sends the signal twice: to the program, and then to its process group.
     screen.signal(Signal::INT);
     std::thread::sleep(std::time::Duration::from_millis(5));
     screen.signal(Signal::INT);

@@ -148,7 +148,7 @@ fn message_that_violates_its_schema_is_detected() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// Head and position of each point of a cloud.
+/// Number of the head, and position, of each point in a point cloud message.
 fn points_of(cloud: &Value) -> Vec<(u8, [f64; 3])> {
     let origin = numbers(&cloud["pose"]["position"], ["x", "y", "z"]);
     let stride = usize::try_from(cloud["point_stride"].as_u64().unwrap()).unwrap();
@@ -196,7 +196,7 @@ fn summary_and_indexes_match_a_full_read() {
         let indexes: Vec<_> = summary.read_message_indexes(&log, chunk).unwrap().into_iter().collect();
         for (channel, entries) in indexes {
             *indexed.entry(channel.id).or_default() += entries.len() as u64;
-            // Every lookup decompresses the chunk, so only some entries are checked.
+            // Every lookup decompresses the chunk, so only some of the index entries are checked.
             for entry in entries.into_iter().step_by(41) {
                 let message = summary.seek_message(&log, chunk, &entry).unwrap();
                 assert_eq!((message.channel.id, message.log_time), (channel.id, entry.log_time));

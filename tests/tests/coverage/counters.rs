@@ -15,8 +15,8 @@ type Legs = &'static [(f64, f64, f64)];
 const STEADY: Legs = &[(14.0, 0.2, 0.0)];
 const STOP_AND_GO: Legs = &[(3.0, 0.3, 6.0), (2.0, 0.2, 11.0), (4.0, 0.31, 4.0), (3.0, 0.25, 0.0)];
 const WANDERING: &str = "tether_slack = { reach_m = 0.06, period_s = 30 }\n";
-/// Three simultaneous swings with a total reach of 10 cm; the period of one equals the turn time of a head. The
-/// attitude of the inertial unit wanders at the same rate as the cable.
+/// Three simultaneous swings of the cable with a total reach of 10 cm. The period of one swing equals the turn time of
+/// a head. The attitude of the inertial unit wanders at the same rate as the cable.
 const SWINGING: &str = "tether_slack = { swings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.021, period_s = 10 }, \
     { reach_m = 0.055, period_s = 20 }] }\n";
 

@@ -53,7 +53,8 @@ fn every_flag(
     assert!(said.is_empty(), "{} of {raised} flags: {:#?}", said.len(), &said[..said.len().min(8)]);
 }
 
-/// Longest additional delay, s. A flag waits until the heads are past the section's end or the vehicle is stationary.
+/// A flag that becomes due less than this time before the end of the dive need not be raised, s. The loop waits until
+/// the heads have passed the section's end or the vehicle is stationary.
 const SOON_S: f64 = 3.0;
 
 /// Whether a flag was raised before its due moment, or raised although none was due.

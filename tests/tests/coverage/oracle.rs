@@ -70,8 +70,8 @@ fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section passed on the samples of some visits alone. Samples of the other visits can only make its hole
-/// smaller.
+/// Whether a section passed and its hole's upper bound, from the samples of some visits alone, is at least this
+/// diameter. The oracle uses the samples of all visits, which can only make the hole smaller.
 fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
     let most_m = section.hole_most_m.filter(|_| section.verdict == Verdict::Pass);
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
@@ -120,7 +120,8 @@ fn verdicts_follow_from_hole_sigma_and_target() {
         let radius_m = f64::midpoint(target_m, twice_m);
         let ends = [section.start_m, section.end_m];
         let first_m = first_failing_m(wall, ends, radius_m, passed_m);
-        // Whether a circle touches the end of the stretch that all heads have crossed.
+        // Whether the first failing place changes if the start of the stretch that all heads have crossed moves by
+        // `NEAR_M`.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
         // Tolerance for differences between oracle and program. The oracle finds the first failing place to within one

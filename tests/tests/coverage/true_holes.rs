@@ -7,7 +7,7 @@ use headrace_oracle::second;
 use headrace_oracle::wall::{Place, Wall};
 use headrace_tests::{root, skipped};
 
-/// Places from `tests/oracles/holes_truth.csv`, and the perimeter of the wall.
+/// The wall with the samples and the perimeter from `tests/oracles/holes_truth.csv`.
 fn committed() -> Wall {
     let text = std::fs::read_to_string(root().join("tests/oracles/holes_truth.csv")).unwrap();
     let (first, rest) = text.split_once('\n').unwrap();
@@ -19,7 +19,7 @@ fn committed() -> Wall {
     Wall::new(rest.lines().skip(1).map(place), perimeter_m).unwrap()
 }
 
-/// Start, end and D of the sections in a table, m.
+/// Start, end and hole diameter D of each section in a table, m.
 fn holes(table: &str) -> Vec<[f64; 3]> {
     let row = |line: &str| -> [f64; 3] {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();

@@ -43,7 +43,7 @@ fn far_over(dive: &truth::JudgedDive, target_m: f64) -> usize {
     passed.filter(|section| section.true_hole_m > 1.1 * target_m).count()
 }
 
-/// The counter is stuck for 12 s while the vehicle continues to move.
+/// Simulator fault: the cable counter is stuck for 12 s while the vehicle continues to move.
 const STUCK: &str =
     "[[effects.device_faults]]\nsensors = [\"tether\"]\nkind = \"stick\"\nfrom_s = 60\nfor_s = 12\n";
 

@@ -19,7 +19,7 @@ use crate::mutate::broken;
 /// Start time of the logs.
 const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// Lowest sensor number of the second vehicle.
+/// Lowest sensor number of the second vehicle (see `Surroundings::vehicles`).
 pub(crate) const OTHERS: u8 = 128;
 
 /// Kind of a file; it determines the reader.
@@ -37,9 +37,9 @@ pub(crate) enum Kind {
     Scene,
     /// Data of a device: sensor number, random seed for the split into pieces, and the device's bytes.
     Line,
-    /// A packet of operator input.
+    /// A packet with an operator's command.
     Console,
-    /// A message of a page viewer.
+    /// A message that a viewer of the operator's page sends to the server.
     Viewer,
 }
 
@@ -161,7 +161,7 @@ const REQUESTS: [&str; 3] = [
     r#"{"do":"rate","hz":1}"#,
 ];
 
-/// Bytes that each device of the two vehicles sends in the first seconds of a short dive.
+/// Bytes that each device of the two test vehicles sends in the first seconds of a short dive.
 fn lines() -> Vec<Vec<u8>> {
     let mut found = Vec::new();
     for (text, first) in [(headrace_tests::VEHICLE.to_owned(), 0), (headrace_tests::other_vehicle(), OTHERS)]
@@ -187,7 +187,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// Message content that differs for each number and varies in length.
+/// Content of test message `number`: its bytes and its length differ from message to message.
 fn content(number: u64) -> Vec<u8> {
     let mut random = Random(number);
     (0..=number % 40).map(|_| random.bits().to_le_bytes()[3]).collect()

@@ -148,7 +148,8 @@ fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
     })
 }
 
-/// Tries files from a seed on until `enough` returns true for the number of tried files.
+/// Tries random files, drawn from `seed`, until `enough` returns true for the number of files tried. Returns the
+/// failures.
 fn fuzz(seed: u64, enough: impl Fn(u64) -> bool) -> Vec<String> {
     let corpus = Corpus::new();
     let around = Surroundings::new();

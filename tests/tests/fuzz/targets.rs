@@ -28,7 +28,7 @@ use headrace_tests::random::Random;
 use crate::corpus::{Corpus, Kind, OTHERS};
 use crate::messages::{Said, said};
 
-/// Vehicles and mappings that the readers need.
+/// Vehicle configurations that the readers under test need.
 pub(crate) struct Surroundings {
     vehicle: VehicleConfig,
     /// Vehicles with devices that send data. The sensor numbers of the second vehicle begin at `OTHERS`.
@@ -286,8 +286,8 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
 /// Imports a file into a log, and checks that the log is intact.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        // Of these kinds, only ROS recordings have an importer. So files of all these kinds are tried as ROS
-        // recordings.
+        // Among these kinds of file, only ROS recordings have an importer. So the fuzzer imports files of all these
+        // kinds as ROS recordings.
         Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());

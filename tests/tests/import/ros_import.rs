@@ -21,8 +21,8 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// A folder with recordings, tables, the vehicle file and a mapping. Each table of the mapping also contains the lines
-/// `further`.
+/// A folder with recordings, tables, the vehicle file and a mapping. In the mapping, `further` is added to the table of
+/// each topic.
 fn folder(further: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
@@ -243,7 +243,7 @@ fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (O
     (answer.code, answer.stderr)
 }
 
-/// Increases the number of messages in the statistics by three.
+/// Increases the number of messages stated in the file's statistics record by three.
 fn state_three_more(bytes: &mut [u8]) {
     let number = |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
     // The closing magic has 8 bytes, and the footer before it has 20. The footer begins with the position of the

@@ -29,7 +29,8 @@ fn has_strace() -> bool {
     can
 }
 
-/// Records a dive with this system fault. The dive is long enough for several syncs. Returns exit code and report.
+/// Records a dive while strace injects this fault into system calls. The dive is long enough for several syncs. Returns
+/// exit code and report.
 fn with_fault(folder: &Folder, fault: &[&str], records: &[&str]) -> (Option<i32>, Value) {
     let strace = [&["strace", "-f", "-qq", "-o", "trace.txt"][..], fault].concat();
     let records: Vec<&str> = records.iter().flat_map(|record| ["--record", record]).collect();
@@ -202,7 +203,7 @@ fn wait_for(path: &Path, dive: &mut Child) {
     wait_for_more(path, 0, dive);
 }
 
-/// Waits until a file is longer than `than` bytes; returns its length.
+/// Waits until a file grows beyond `than` bytes; returns the file's new length.
 fn wait_for_more(path: &Path, than: u64, dive: &mut Child) -> u64 {
     loop {
         let len = std::fs::metadata(path).map_or(0, |file| file.len());

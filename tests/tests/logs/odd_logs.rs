@@ -13,7 +13,7 @@ fn replay(folder: &Folder, log: &str) -> Answer {
     folder.headrace(&[&["replay", log], &WITH_VEHICLE[..]].concat())
 }
 
-/// Lines of a replay's output that concern the log itself.
+/// Lines of a replay's output with losses ("LOST") and notes about the log.
 fn told(answer: &Answer) -> String {
     let odd = answer.stdout.lines().filter(|line| line.contains("LOST") || line.contains("note"));
     odd.fold(String::new(), |all, line| all + line.trim() + "\n")

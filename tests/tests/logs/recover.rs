@@ -25,7 +25,7 @@ fn recover(folder: &Folder, log: &str, output: &str) -> (Option<i32>, Value) {
 fn damaged_log_and_its_recovery_have_the_same_digest() {
     let (folder, whole) = recorded();
     let mut spotted = whole.clone();
-    // This simulates a disk that loses a block of 4096 bytes.
+    // The zeroed bytes simulate a disk that loses a block of 4096 bytes.
     spotted[whole.len() / 2..][..4096].fill(0);
     for (name, bytes) in [("cut", &whole[..whole.len() * 2 / 3]), ("spotted", &spotted)] {
         let (log, fixed) = (format!("{name}.mcap"), format!("{name}-fixed.mcap"));

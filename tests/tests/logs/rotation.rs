@@ -7,7 +7,7 @@ use std::time::Duration;
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Number of kills.
+/// Number of dives that the test kills while they are recorded.
 const KILLS: u64 = 12;
 
 fn record(folder: &Folder, further: &[&str]) -> Value {

@@ -97,7 +97,8 @@ fn found<'a>(report: &'a Value, of: &str, what: &str) -> &'a Value {
         .unwrap_or_else(|| panic!("{of} {what}: {report:#}"))
 }
 
-/// Checks that the error of the latency is within three of its standard deviations and within `most_ms`.
+/// Checks that the latency found by `calibrate` differs from the truth by at most three reported standard deviations,
+/// and by less than `most_ms`.
 #[track_caller]
 fn assert_latency(report: &Value, of: &str, truth_ms: f64, most_ms: f64) {
     let row = found(report, of, "latency");

@@ -90,7 +90,7 @@ fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
     Rot::from_roll_pitch_yaw(roll, pitch, 0.0)
 }
 
-/// Errors of a filter, degrees.
+/// Attitude errors of a filter, degrees.
 #[derive(Debug, Clone, Copy)]
 struct Off {
     inclination_rms: f64,

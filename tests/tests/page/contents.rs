@@ -21,7 +21,7 @@ fn replayed_with(folder: &Folder, further: &[&str]) -> (Serving, Viewer) {
     (serving, viewer)
 }
 
-/// First and last time of the log.
+/// First and last time of the log that the viewer can play back, s.
 fn span_s(viewer: &Viewer) -> [f64; 2] {
     ["from_s", "to_s"].map(|key| viewer.state["playback"][key].as_f64().unwrap())
 }

@@ -24,7 +24,7 @@ use crate::ANY;
 
 const TOKENS: &str = "operator = operator-0123456789abcdef\nviewer = viewer-0123456789abcdef\n";
 const TOKEN: &str = "Authorization: Bearer viewer-0123456789abcdef";
-/// Longest time to wait for an answer.
+/// Longest time to wait for the server's answer.
 const WITHIN: Duration = Duration::from_mins(2);
 
 type Secured = StreamOwned<ClientConnection, TcpStream>;

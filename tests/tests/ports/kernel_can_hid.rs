@@ -66,7 +66,7 @@ fn refused(read: std::io::Result<CanFrame>) -> (Option<i32>, ErrorKind) {
     (error.raw_os_error(), error.kind())
 }
 
-/// Result of reading from a socket without data.
+/// Kind of the error that a read returns because no frame arrives in `SHORT`.
 fn silence(socket: &CanSocket) -> ErrorKind {
     socket.set_read_timeout(SHORT).unwrap();
     let (_, kind) = refused(socket.read_frame());
@@ -160,7 +160,7 @@ fn uhid() -> File {
     File::options().read(true).write(true).open(PATH).unwrap_or_else(|error| panic!("{PATH}: {error}"))
 }
 
-/// A report in the reference layout with this count.
+/// An HID report of a cable counter in the reference layout, with this count.
 fn report(count: i32) -> Vec<u8> {
     let mut report = vec![1, 42, 1];
     report.extend(count.to_le_bytes());

@@ -114,7 +114,7 @@ struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// Starts the rehearsal. `change` may wrap the driver of each sensor.
+    /// Starts supervisor and loop with these addresses of the sensors. `change` may wrap the driver of each sensor.
     fn new(connects: [&str; 2], change: &dyn Fn(usize, Box<dyn Driver>) -> Box<dyn Driver>) -> Self {
         let scene = scenes::scene_from(WAY, &|_| Ok(TWO_SENSORS.as_bytes().to_vec()));
         let vehicle = &scene.vehicle;
@@ -135,7 +135,7 @@ impl Rehearsal {
         Self { supervisor, dive, said: Vec::new(), simulation, messages: [VecDeque::new(), VecDeque::new()] }
     }
 
-    /// Next message of the sensor.
+    /// Next message that the simulated sensor sends.
     fn next_message(&mut self, source: usize) -> Vec<u8> {
         loop {
             if let Some(message) = self.messages[source].pop_front() {
@@ -148,7 +148,7 @@ impl Rehearsal {
         }
     }
 
-    /// Runs the loop until `ended` returns true or the time is over. Returns the last result of `ended`.
+    /// Runs the loop until `ended` returns true or the time limit is reached. Returns the last result of `ended`.
     fn run(&mut self, time: DurNs, ended: &dyn Fn(&Loop, &[Status]) -> bool) -> bool {
         let until = now() + time;
         let has_ended = Cell::new(false);
@@ -187,7 +187,7 @@ impl Rehearsal {
         self.dive.decoder_counts()[source].good_frames
     }
 
-    /// Runs until no more data of a sensor arrives; returns the number of frames.
+    /// Runs the loop until no more data of a sensor arrives; returns the number of decoded frames.
     fn settle(&mut self, source: usize) -> u64 {
         loop {
             let good = self.good(source);
@@ -365,7 +365,8 @@ fn can_interface_down_and_up_is_read_again_from_the_first_frame() {
             Phase::Closed,
             "opening vcan3: the interface is down; sudo ip link set vcan3 up",
         );
-        // During the outage, messages of the unit are lost. The second outage is longer than the silence timeout.
+        // During the outage, messages of the inertial unit are lost. The second outage is longer than the silence
+        // timeout.
         rehearsal.send(IMU, &mut imu, 3);
         rehearsal.exactly(TETHER, &mut tether, 60);
         if round == 1 {
@@ -416,7 +417,7 @@ fn replugged_can_adapter_is_used_again() {
     rehearsal.send(IMU, &mut imu, 3);
     rehearsal.exactly(TETHER, &mut tether, 60);
     let vcan = Interface::up("vcan6");
-    // The unit's end existed before the new interface, and continues to work.
+    // The inertial unit's end of the line existed before the new interface, and continues to work.
     rehearsal.call(IMU, &mut imu);
     rehearsal.exactly(IMU, &mut imu, 100);
     rehearsal.wait_for(IMU, Phase::Running, "");

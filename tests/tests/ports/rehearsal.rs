@@ -118,7 +118,7 @@ fn replay(folder: &Folder, log: &Path, name: &str) -> (Option<i32>, Value) {
     (done.unwrap().code(), report(&folder.path(name)))
 }
 
-/// Sections by the chainage of their start, as text in metres with three decimals.
+/// Sections of a report. The key is the chainage of the section's start, as text in metres with three decimals.
 fn sections(report: &Value) -> BTreeMap<String, &Value> {
     let sections = report["sections"].as_array().unwrap().iter();
     sections.map(|section| (format!("{:9.3}", section["start_m"].as_f64().unwrap()), section)).collect()
@@ -136,7 +136,7 @@ fn is_near(section: &Value) -> bool {
     section["verdict"] == "pass" && TARGET_M - of("hole_m") - CONFIDENCE_SD * of("hole_sd_m") < APART_M
 }
 
-/// Differences between sections of the live dive and of the replay, without the last 0.7 m.
+/// Differences between the sections of the live dive and those of the replay. The last 0.7 m of the dive are ignored.
 ///
 /// At the end, the last updates and turns decide how far the dive reaches and whether its last section is judged.
 fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value>) -> Vec<String> {

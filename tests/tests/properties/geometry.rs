@@ -111,7 +111,8 @@ fn rays(case: &mut Case) -> Result<(), String> {
     inverses(case, &profile)
 }
 
-/// Converts an arc length to a place and back, both in a polygon and in a shape of arcs.
+/// Converts an arc length to a place on the wall and back, in a polygon and in a shape made of arcs. Checks that the
+/// direction from the reference point stays the same.
 fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
     let width_m = case.between(0.5, 12.0);
     let shape = match case.below(3) {

@@ -9,7 +9,7 @@ use headrace_sampling::spacing::{self, Spiral};
 
 use crate::{Case, few, many, within};
 
-/// A random argument. It is often zero, negative, extreme, infinite or not a number.
+/// A random argument of an equation. It is often zero, negative, extreme, infinite or not a number.
 fn any(case: &mut Case) -> f64 {
     match case.below(12) {
         0 => 0.0,
@@ -42,7 +42,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
     ];
     for (number, told) in told.into_iter().enumerate() {
         match told {
-            // Infinite results are allowed only if an argument is extremely large or small.
+            // An equation may return infinity only if an argument is extremely large or small.
             Ok(value)
                 if value.is_finite() || [a, b, c].iter().any(|x| x.abs() > 1e100 || x.abs() < 1e-100) => {}
             Ok(value) => return Err(format!("equation {number} of {a:e} {b:e} {c:e} {m}: {value}")),
@@ -54,7 +54,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("a turn of {a:e} {b:e}"));
     }
 
-    // The steps add up to the distance along the wall, even if the last step ends near 90 degrees.
+    // The steps T_y along the wall add up to the distance along the wall, even if the last step ends near 90 degrees.
     let last = 1 + case.count_below(400);
     let end_rad = FRAC_PI_2 * (1.0 - case.power_of_ten(-9.0, -0.1));
     let theta = end_rad / f64::from(last);

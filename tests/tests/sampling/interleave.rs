@@ -1,7 +1,7 @@
 //! Interleaving of several heads by the paper's §5. The tests step the heads ping by ping along a straight tunnel.
 //!
-//! They collect the chainages at which each head looks at a given angle. Each head is stepped by its own program. So
-//! the layout formulas aren't tested with other layout formulas.
+//! They collect the chainages at which each head looks at a given angle. Each head is stepped by its own ping-by-ping
+//! schedule (`HeadProgram`). So the test doesn't check the layout formulas with the same formulas.
 
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::math::{PI, TAU, floor_to_i64};
@@ -21,12 +21,13 @@ const SAME_RAD: f64 = 1e-9;
 const SAME_M: f64 = 1e-7;
 /// Number of pings in a turn, divisible by 2 to 6 sectors.
 const STEPS: u32 = 120;
-/// Directions of the heads: all forward; forward and aft in turn; the first forward and all others aft; all aft.
+/// Directions in which the heads face: all forward; forward and aft in turn; the first forward and all others aft; all
+/// aft.
 const FACINGS: [fn(usize) -> bool; 4] = [|_| false, |k| k % 2 == 1, |k| k > 0, |_| true];
 
 const SPEEDS_MPS: [f64; 3] = [0.1, 0.197, 0.8];
 
-/// Heads along a hull. All of them are on the axis and turn in the same direction.
+/// A set of heads mounted along a hull. All heads are on the hull's axis and turn in the same direction.
 #[derive(Debug, Clone)]
 struct Rig {
     hull_m: Vec<f64>,
@@ -125,7 +126,8 @@ struct Track {
 }
 
 impl Track {
-    /// Chainages at which the head looks at a body angle. If the head turns back at this angle, it counts once.
+    /// Chainages at which the head looks at an angle of the body frame. If the head turns back at this angle, it counts
+    /// once.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let off: Vec<f64> = self.body.iter().map(|body| wrapped(body - angle)).collect();
         let mut found = Vec::new();
@@ -140,7 +142,7 @@ impl Track {
         found
     }
 
-    /// Body angle at a chainage.
+    /// Angle of the head in the body frame when the head is at a chainage.
     fn body_at(&self, chainage_m: f64) -> f64 {
         let n = (chainage_m - self.x_m) / self.ping_m;
         let whole = usize::try_from(floor_to_i64(n)).unwrap();
@@ -150,12 +152,13 @@ impl Track {
 
 struct Dive {
     tracks: Vec<Track>,
-    /// First and last chainage common to all heads.
+    /// First and last chainage that all heads have passed, m.
     shared_m: [f64; 2],
 }
 
 impl Dive {
-    /// All passes over a body angle within the common chainages, in order.
+    /// Chainages at which any head passes an angle of the body frame, in order, within the chainages that all heads
+    /// have passed.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let mut all: Vec<f64> = self.tracks.iter().flat_map(|track| track.passes(angle)).collect();
         all.retain(|&m| m > self.shared_m[0] - SAME_M && m < self.shared_m[1] + SAME_M);
@@ -291,7 +294,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
         let program = HeadProgram { start_rad: 0.0, growing: true, sector: Some((0.0, size)) };
         let ping_m = speed_mps * rig.ping_s();
         let lead = Track { x_m: 0.0, ping_m, body: walk(&program, rig.step_rad(), 8 * STEPS) };
-        // The chainages begin where both heads have been, and are 1.37 pings apart.
+        // The tested chainages begin where both heads have been, and are 1.37 pings apart.
         for now_m in (0..150).map(|n| 3.8 + f64::from(n) * 1.37 * ping_m) {
             let state = |m: f64| (lead.body_at(m), lead.body_at(m + SAME_M) > lead.body_at(m));
             let ((angle_rad, growing), (along, outward)) = (state(now_m), state(now_m - behind_m));
@@ -318,7 +321,8 @@ fn gaps_of_a_faster_vehicle_differ_by_the_phase_errors() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for hull_m in &hulls(heads)[1..] {
             let dive = Rig::new(hull_m, facing, turn_s).dive(PhaseShift, planned_mps, speed_mps);
-            // Delay of a head at place x, in addition to its planned phase, turns: x / (v T) - x / (v' T).
+            // Delay of a head at position x along the hull, in addition to its planned phase, in turns: x / (v T) - x /
+            // (v' T).
             let late = |x_m: f64| (ends(hull_m)[1] - x_m) * (1.0 / planned_mps - 1.0 / speed_mps) / turn_s;
             let first: Vec<f64> = dive.tracks.iter().map(|track| track.passes(1.0)[0]).collect();
             for k in 1..heads {
@@ -334,7 +338,8 @@ fn gaps_of_a_faster_vehicle_differ_by_the_phase_errors() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        // The seed is fixed, because one start in a million is so close to a step that rounding decides its ping.
+        // The random seed is fixed, because one start angle in a million is so close to a step that rounding decides
+        // which ping reaches it.
         cases: 100, failure_persistence: None, rng_seed: RngSeed::Fixed(881), ..ProptestConfig::default()
     })]
 

@@ -27,7 +27,7 @@ struct Row {
 }
 
 impl Row {
-    /// Input number `i` of the row. Inputs are numbered from 1, as in the file's header.
+    /// Input number `i` of a row of `oracles/sampling.csv`. Inputs are numbered from 1, as in the file's header.
     fn i(&self, i: usize) -> f64 {
         self.inputs[i - 1]
     }
@@ -36,7 +36,7 @@ impl Row {
         u32::try_from(math::round_to_i64(self.i(i))).unwrap()
     }
 
-    /// Checks `got` against the oracle's value with an absolute tolerance.
+    /// Checks the program's result `got` against the oracle's value with an absolute tolerance.
     fn near(&self, got: f64, tolerance: f64) {
         let off = (got - self.value).abs();
         assert!(
@@ -49,12 +49,12 @@ impl Row {
         );
     }
 
-    /// Checks `got` to some units in the last place.
+    /// Checks that the program's result `got` equals the oracle's value to some units in the last place.
     fn ulps(&self, got: f64, ulps: f64) {
         self.near(got, ulps * ULP * self.value.abs());
     }
 
-    /// Relative error of `got`.
+    /// Relative error of the program's result `got`.
     fn share(&self, got: f64) -> f64 {
         (got - self.value).abs() / self.value.abs().max(f64::MIN_POSITIVE)
     }
@@ -66,7 +66,7 @@ impl Row {
     }
 }
 
-/// Rows of the cases with these names. All of them must exist.
+/// Rows of `oracles/sampling.csv` for the cases with these names. Every case must exist.
 fn rows(cases: &[&str]) -> Vec<Row> {
     let mut found = Vec::new();
     for (number, line) in ROWS.lines().enumerate() {

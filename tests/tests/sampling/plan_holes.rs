@@ -19,7 +19,8 @@ const MODES: [(&str, f64, f64); 3] = [("medium", 0.6, 10.8), ("fast", 0.9, 8.0),
 
 type Head = (HeadSpec, Vec<HeadMode>);
 
-/// A head at a place of the vehicle. It faces forward or aft, and its turn time is longer by the factor `slower`.
+/// A head mounted at `place` on the vehicle. It faces forward or aft, and its turn time is longer than that of the mode
+/// by the factor `slower`.
 fn head(place: [f64; 3], aft: bool, radius_m: f64, slower: f64) -> Head {
     let mode = |(name, step_deg, turn_s): (&'static str, f64, f64)| HeadMode {
         name,
@@ -118,7 +119,7 @@ fn in_box(part: &Obstacle, at: Vec3<Body>) -> bool {
     within(Vec3::x) && within(Vec3::y) && within(Vec3::z)
 }
 
-/// Samples of a dive over `length_m` as chainage and arc length.
+/// Samples of a dive over `length_m`, each as chainage and arc length, m.
 fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: Way) -> Vec<[f64; 2]> {
     let schedule = planner.schedule(mode, speed_mps).unwrap();
     let inspection = planner.inspection();

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 
-/// A box of 1 m as PLY, standing on its lower face.
+/// A cube with 1 m edges as a PLY mesh, with the origin in its lower face.
 fn cuboid() -> String {
     let mut text = String::from(
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
