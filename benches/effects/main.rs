@@ -97,13 +97,13 @@ fn named(effects: &[(&str, &str)]) -> String {
     tables.concat()
 }
 
-/// Time to simulate a scene, s.
+/// CPU time to simulate a scene, s.
 fn simulate(scene: &Scene) -> f64 {
     let mut simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
     timed(|| while simulation.advance() {}).1
 }
 
-/// Minimum time of each piece of work. Each round runs every piece once.
+/// Minimum time that each piece of work takes over all rounds, s. Each round runs every piece once.
 fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
     let mut least = [f64::INFINITY; N];
     for _ in 0..rounds {

@@ -5,7 +5,7 @@
 
 use serde_json::{Map, Value};
 
-/// Differences between `value` and the root schema, as text.
+/// Violations of the schema by `value`, as text.
 pub fn faults(schema: &Value, value: &Value) -> Vec<String> {
     let mut faults = Vec::new();
     Checker { root: schema, faults: &mut faults }.check("", schema, value);

@@ -81,7 +81,7 @@ impl Serving {
         ask(&self.address, method, path, headers, body)
     }
 
-    /// Sends a request, which must succeed with status 200. Returns the body of the response.
+    /// Sends a GET request, which must succeed with status 200. Returns the body of the response.
     pub fn get(&self, path: &str) -> Vec<u8> {
         let bytes = answer_of(&self.address, "GET", path, &[], &[]);
         assert!(bytes.starts_with(b"HTTP/1.1 200"), "{path}: {}", String::from_utf8_lossy(&bytes));
@@ -131,41 +131,41 @@ fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[
     bytes
 }
 
-/// A section as the client received it.
+/// A section of the wall as the client received it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenSection {
-    /// 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
+    /// Verdict: 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
     pub verdict: u8,
     /// Verdict for the second target; `None` without a second target.
     pub compared: Option<u8>,
-    /// Number of the cause.
+    /// Number of the cause of the section's verdict.
     pub cause: u8,
-    /// Diameter of the hole, m.
+    /// Diameter of the section's largest hole, m.
     pub hole_m: f32,
     /// Bit set of the covered parts of the section.
     pub seen: u64,
 }
 
-/// A connected client.
+/// A connected client, and everything that it has received.
 pub struct Viewer {
     socket: WebSocket<TcpStream>,
-    /// First message.
+    /// First message that the server sent.
     pub hello: Value,
-    /// Sections by number.
+    /// Sections of the wall by number.
     pub sections: BTreeMap<i32, SeenSection>,
-    /// Number of samples received.
+    /// Number of wall samples received.
     pub samples: u64,
     /// Number of section frames received, and number of sections in these frames.
     pub section_frames: (u64, u64),
-    /// Last state.
+    /// Last live state received.
     pub state: Value,
     /// Last list of alerts, updated by all later changes.
     pub alerts: BTreeMap<u64, Value>,
-    /// Notes.
+    /// Operator's notes received.
     pub notes: Vec<Value>,
-    /// Other messages, newest last.
+    /// All other messages received, newest last.
     pub others: Vec<Value>,
-    /// Last sequence number.
+    /// Last sequence number received.
     pub seq: u64,
     /// Schema of text messages: `docs/reference/page-feed.schema.json`.
     schema: Value,
@@ -263,24 +263,24 @@ impl Viewer {
         self.until("a state", |viewer| !viewer.state.is_null());
     }
 
-    /// Reads a message.
+    /// Reads a message and updates the fields.
     pub fn read(&mut self) -> Result<(), tungstenite::Error> {
         let message = self.socket.read()?;
         self.take(&message);
         if message.is_close() { Err(tungstenite::Error::ConnectionClosed) } else { Ok(()) }
     }
 
-    /// Sends a command.
+    /// Sends an operator's command to the server.
     pub fn send(&mut self, command: &Value) {
         self.send_raw(Message::Text(command.to_string().into())).unwrap();
     }
 
-    /// Sends any message.
+    /// Sends any WebSocket message to the server.
     pub fn send_raw(&mut self, message: Message) -> Result<(), tungstenite::Error> {
         self.socket.send(message)
     }
 
-    /// Query that resumes a lost connection.
+    /// URL query with which a client resumes a lost connection.
     pub fn resume(&self) -> String {
         format!("?instance={}&since={}", self.hello["instance"].as_str().unwrap(), self.seq)
     }

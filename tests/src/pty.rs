@@ -30,7 +30,7 @@ impl Terminal {
         Self { reader: File::from(master), end }
     }
 
-    /// The end that the program uses.
+    /// The end of the pseudoterminal that the program uses.
     pub fn end(&self) -> File {
         self.end.try_clone().unwrap()
     }
@@ -117,7 +117,7 @@ impl OnTerminal {
         String::from_utf8_lossy(&self.written).into_owned()
     }
 
-    /// All output so far.
+    /// All output of the program so far.
     pub fn so_far(&self) -> String {
         String::from_utf8_lossy(&self.written).into_owned()
     }

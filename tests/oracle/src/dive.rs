@@ -97,7 +97,7 @@ impl PacketSource for PacketFeed<'_> {
 pub struct Recorded {
     /// Packets sent by the devices.
     pub packets: Packets,
-    /// True places where beams met the wall.
+    /// Simulated truth: the places where beams met the wall.
     pub truth: Arc<Truth>,
     /// True trajectory of the vehicle.
     pub scenery: Scenery,
@@ -109,7 +109,7 @@ pub struct Recorded {
 /// A reported section with its true hole.
 #[derive(Debug, Clone)]
 pub struct JudgedSection {
-    /// Report of the section.
+    /// The section as reported by the loop.
     pub report: SectionRow,
     /// D_true, m; infinite without samples.
     pub true_hole_m: f64,
@@ -117,11 +117,11 @@ pub struct JudgedSection {
     pub shift_m: f64,
 }
 
-/// Report of a dive, with its truth.
+/// Report of a dive, and the truth of the dive's sections.
 pub struct JudgedDive {
     /// Report from the loop.
     pub report: Report,
-    /// The truth.
+    /// True places where beams met the wall.
     pub truth: Arc<Truth>,
     /// All sections, in order.
     pub sections: Vec<JudgedSection>,
@@ -303,7 +303,7 @@ fn scenery_of(simulation: &Simulation) -> Result<Scenery, TruthError> {
 #[derive(Resource, Default)]
 struct Seen(Vec<(MonoNs, f64, f64)>);
 
-/// Observer that records the places of samples and changes nothing.
+/// Observer of the loop that records the places of samples and changes nothing.
 struct Watch;
 
 impl Plugin for Watch {
@@ -338,8 +338,8 @@ impl Seen {
 struct Shifts(Vec<(f64, f64)>);
 
 impl Shifts {
-    /// Median shift of the samples near a section. If there are none near it, the shift of the nearest sample;
-    /// in a dive without samples, 0.
+    /// Median chainage offset (true minus estimated) of the samples near a section. If there are none near it, the
+    /// shift of the nearest sample; in a dive without samples, 0.
     fn about(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|(sample_x_m, _)| *sample_x_m < x_m);
         let near = self.0.get(before(from_m - NEAR_M)..before(to_m + NEAR_M)).unwrap_or_default();

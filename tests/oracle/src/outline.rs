@@ -15,7 +15,7 @@ pub struct Outline {
     perimeter_m: f64,
     /// Angle of the first point, rad.
     from_rad: f64,
-    /// Points in order of angle: angle relative to the first point, place, and arc length.
+    /// Outline points in order of angle. Each has its angle relative to the first point, its place, and its arc length.
     points: Vec<(f64, Yz, f64)>,
 }
 

@@ -26,7 +26,7 @@ pub const REPLACING: [&str; 10] = [
     "device_faults",
     "stuck_range",
 ];
-/// Properties by which those effects mark a changed return.
+/// Properties by which the effects in [`REPLACING`] mark a changed return.
 const REPLACED: [&str; 2] = ["range_m", "wrong_bytes"];
 
 /// A place where a beam truly met the wall.
@@ -34,7 +34,7 @@ const REPLACED: [&str; 2] = ["range_m", "wrong_bytes"];
 pub struct TrueSample {
     /// Time of the ping.
     pub at: MonoNs,
-    /// Number of the source.
+    /// Number of the source (the profiling head).
     pub source: u16,
     /// Chainage and arc length, m.
     pub place: Place,
@@ -43,7 +43,7 @@ pub struct TrueSample {
 /// Ground truth of a dive.
 #[derive(Debug, Clone)]
 pub struct Truth {
-    /// Places where beams met the wall, grouped by source within each second.
+    /// Places where beams truly met the wall, grouped by source within each second.
     pub samples: Vec<TrueSample>,
     /// Smallest and largest chainage of the vehicle, m.
     pub way_m: [f64; 2],

@@ -13,7 +13,7 @@ const TINY_M: f64 = 1e-100;
 /// Largest rounding error of a circumradius or a circumcentre, m.
 const ROUNDING_M: f64 = 1e-6;
 
-/// A place: chainage and arc length, m.
+/// A place on the unrolled wall: chainage and arc length, m.
 pub type Place = [f64; 2];
 
 #[derive(Clone, Copy)]

@@ -16,7 +16,7 @@ pub enum Sabotage {
 }
 
 impl Sabotage {
-    /// All sabotages.
+    /// All kinds of sabotage.
     pub const ALL: [Self; 5] =
         [Self::CableLoses, Self::NeighbourBreaks, Self::DiskForgets, Self::SyncLies, Self::DropsUntold];
 }
