@@ -88,7 +88,7 @@ pub struct Rig {
 pub struct Ended {
     /// State of the dive at its end.
     pub view: View,
-    /// History of each sensor's line: connections, losses and statuses.
+    /// Counts of openings, losses and dropped packets of each line, and its last status.
     pub lines: Vec<LineHistory>,
     /// Report of the dive.
     pub report: Report,

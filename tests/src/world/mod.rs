@@ -173,7 +173,7 @@ pub struct Line {
     pub whole: u64,
     /// Number of good frames that the loop found.
     pub good: u64,
-    /// History of the line: connections, losses and statuses.
+    /// Counts of openings, losses and dropped packets of the line, and its last status.
     pub history: LineHistory,
 }
 

@@ -70,7 +70,7 @@ fn there_and_back(there_mps: f64) -> Vec<Value> {
 }
 
 #[test]
-fn too_fast_is_not_raised_over_wall_with_a_pass_or_while_reversing() {
+fn too_fast_is_not_raised_over_passed_wall_or_while_reversing() {
     let lines = there_and_back(0.09);
     let conditions_there = conditions(&lines, false, [7.0, 13.0]);
     assert!(conditions_there.iter().all(|condition| *condition != "passed"), "{conditions_there:?}");
@@ -84,7 +84,7 @@ fn too_fast_is_not_raised_over_wall_with_a_pass_or_while_reversing() {
 /// When the vehicle goes forward again, the speed limit is displayed early enough for the pilot to slow down before the
 /// heads reach unsampled wall.
 #[test]
-fn speed_limit_returns_before_the_heads_reach_new_wall() {
+fn speed_limit_is_displayed_again_before_the_heads_reach_unsampled_wall() {
     let lines = told(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
          [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 12\nspeed_mps = 0.09\n\

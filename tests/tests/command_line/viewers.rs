@@ -234,7 +234,7 @@ fn verify_names_the_first_different_pose() {
 
 /// The layout may only use existing topics, and keys from the schemas of these topics.
 #[test]
-fn layout_uses_existing_topics_and_keys() {
+fn viewer_layout_uses_existing_topics_and_keys() {
     let (folder, _) = recorded();
     let topics = view(&folder.read("live.mcap"));
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/how-to/viewers/layout.json");

@@ -48,7 +48,7 @@ fn dive(parked_s: u32, rounds: usize) -> (JudgedDive, Vec<usize>) {
 }
 
 #[test]
-fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
+fn hour_of_parking_and_hundred_trips_back_and_forth_change_no_verdict() {
     let (once, _) = dive(0, 1);
     let (long, used) = dive(PARKED_S, ROUNDS);
     assert_eq!(once.sections.len(), long.sections.len());

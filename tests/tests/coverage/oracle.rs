@@ -219,7 +219,7 @@ fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
 }
 
 #[test]
-fn holes_of_lattices_match_their_exact_values() {
+fn holes_of_sample_lattices_match_exact_values() {
     let diagonal_m = math::sqrt(2.0);
     // A lattice of squares of 0.25 m, in which all four corners of a square are on a common circle. The second
     // section contains no centre of a square.
@@ -246,7 +246,7 @@ fn scattered(seed: u64, count: usize, perimeter_m: f64) -> Vec<Place> {
 }
 
 #[test]
-fn holes_of_small_sets_match_a_dense_search() {
+fn holes_of_small_sample_sets_match_a_dense_grid_search() {
     let (perimeter_m, step_m) = (2.0, 0.004);
     for seed in 0..30 {
         let wall =

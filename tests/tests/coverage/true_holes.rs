@@ -29,7 +29,7 @@ fn holes(table: &str) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn true_holes_match_another_program() {
+fn true_holes_match_an_independent_program() {
     let wall = committed();
     let expected = holes(&std::fs::read_to_string(root().join("tests/oracles/holes.csv")).unwrap());
     assert_eq!(expected.len(), 12);
@@ -42,7 +42,7 @@ fn true_holes_match_another_program() {
 }
 
 #[test]
-fn other_program_reproduces_the_committed_table() {
+fn independent_program_reproduces_the_committed_table_of_holes() {
     let script = root().join("tests/oracles/holes.py");
     let has_scipy = Command::new("python3").args(["-c", "import scipy"]).output();
     if !has_scipy.is_ok_and(|output| output.status.success()) {

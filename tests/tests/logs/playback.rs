@@ -319,7 +319,7 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
 /// Other targets are judged in a second replay of the whole log. An unfinished replay covers less of the dive, so the
 /// figures wouldn't be comparable.
 #[test]
-fn unfinished_replay_is_not_judged_by_other_targets() {
+fn unfinished_replay_is_not_compared_with_other_targets() {
     let folder = logs();
     let arguments = ["ticks.mcap", "--speed", "1x", "--target", "0.5,0.3", "--report", "left.json"];
     let answer = interactive(&folder, &arguments, "pause\nseek 12s\nend\n");
@@ -330,7 +330,7 @@ fn unfinished_replay_is_not_judged_by_other_targets() {
 }
 
 #[test]
-fn lines_on_standard_input_pause_step_and_seek() {
+fn commands_on_standard_input_pause_step_and_seek() {
     let folder = logs();
     let lines = "pause\nseek 12s\nstep 3\nback 5s\nstop\nahead 0:02\nspeed max\ngo\n";
     let answer = interactive(&folder, &["ticks.mcap", "--speed", "1x"], lines);

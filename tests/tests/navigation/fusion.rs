@@ -63,7 +63,7 @@ const LEAST_APART: f64 = 0.8;
 
 /// If heads are mounted far apart along the hull, they pass neighbouring lines on the wall at quite different times.
 #[test]
-fn hole_errors_of_heads_apart_along_the_hull_are_within_reported_bounds() {
+fn hole_errors_of_separately_mounted_heads_are_within_reported_bounds() {
     let mut all = Vec::new();
     for (seed, slack) in [(1, "reach_m = 0.03, period_s = 10"), (2, "reach_m = 0.05, period_s = 30")] {
         let text = format!(

@@ -99,7 +99,7 @@ fn tls_page_requires_a_token() {
 }
 
 #[test]
-fn feed_works_over_tls() {
+fn viewer_feed_works_over_tls() {
     let folder = Folder::with_dive();
     let serving = serving(&folder);
     let address = &serving.address;

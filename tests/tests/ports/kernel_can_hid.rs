@@ -219,7 +219,7 @@ fn counter_is_found_by_its_serial_number_and_read() {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn unread_reports_keep_the_first_63() {
+fn unread_hid_reports_keep_the_first_63() {
     let mut api = HidApi::new().unwrap();
     let mut device = plug(uhid(), "HR-0003");
     let (reader, _) = open(&mut api, "HR-0003");
@@ -237,7 +237,7 @@ fn unread_reports_keep_the_first_63() {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn unplugged_counter_is_an_error_and_returns_under_another_number() {
+fn unplugged_counter_is_an_error_and_returns_under_another_device_number() {
     let mut api = HidApi::new().unwrap();
     let mut device = plug(uhid(), "HR-0004");
     let (reader, first_path) = open(&mut api, "HR-0004");

@@ -258,7 +258,7 @@ fn unchanged(_: usize, driver: Box<dyn Driver>) -> Box<dyn Driver> {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn every_frame_and_every_report_is_decoded() {
+fn every_can_frame_and_every_hid_report_is_decoded() {
     let _vcan = Interface::up("vcan1");
     let (mut imu, mut tether) = (EmulatedPort::can("vcan1").unwrap(), counter("HR-0001"));
     let mut rehearsal = Rehearsal::new(["can:vcan1", COUNTER], &unchanged);
@@ -387,7 +387,7 @@ fn can_interface_down_and_up_is_read_again_from_the_first_frame() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn unit_on_a_down_interface_is_read_once_it_is_up() {
+fn inertial_unit_on_a_down_interface_is_read_once_the_interface_is_up() {
     let vcan = Interface::up("vcan4");
     ip_link("set vcan4 down");
     let mut rehearsal = Rehearsal::new(["can:vcan4", COUNTER], &unchanged);
@@ -430,7 +430,7 @@ fn replugged_can_adapter_is_used_again() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn replugged_counter_is_used_again_under_another_number() {
+fn replugged_counter_is_used_again_under_another_device_number() {
     let _vcan = Interface::up("vcan7");
     let (mut imu, mut tether) = (EmulatedPort::can("vcan7").unwrap(), counter("HR-0001"));
     let first = path("HR-0001");

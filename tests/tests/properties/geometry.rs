@@ -137,12 +137,12 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
 }
 
 #[test]
-fn rays_match_the_plain_formula() {
+fn ray_hits_match_the_formula_for_each_edge() {
     few("geometry", &rays);
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn rays_match_the_plain_formula_in_a_long_run() {
+fn ray_hits_match_the_formula_for_each_edge_in_a_long_run() {
     many("geometry", &rays);
 }

@@ -113,12 +113,12 @@ fn equations(case: &mut Case) -> Result<(), String> {
 }
 
 #[test]
-fn equations_give_an_invertible_number_or_an_error() {
+fn random_inputs_give_an_error_or_a_result_that_inverts_to_the_input() {
     few("sampling", &equations);
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn equations_give_an_invertible_number_or_an_error_in_a_long_run() {
+fn random_inputs_give_an_error_or_a_result_that_inverts_to_the_input_in_a_long_run() {
     many("sampling", &equations);
 }

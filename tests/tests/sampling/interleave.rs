@@ -249,7 +249,7 @@ fn phase_shifted_heads_pass_each_angle_at_equal_distances() {
 }
 
 #[test]
-fn heads_in_sectors_sweep_in_phase_with_alternating_pass_distances() {
+fn heads_in_sector_layout_sweep_in_phase_with_alternating_pass_distances() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;
@@ -278,7 +278,7 @@ fn heads_in_sectors_sweep_in_phase_with_alternating_pass_distances() {
 /// The cases are steps of 2.4 degrees in sectors of 90 degrees, and steps of 0.9 degrees in sectors of 120 degrees. The
 /// last step of a sector is shorter, and makes the sweep longer than 2 T / s.
 #[test]
-fn heads_in_sectors_not_divisible_by_the_step_are_in_phase_within_two_pings() {
+fn heads_in_sectors_not_divisible_by_the_angular_step_are_in_phase_within_two_pings() {
     for (steps, heads, turn_s) in [(150, 4, 4.8), (400, 3, 8.0)] {
         let rig = Rig { steps, ..Rig::new(&hulls(heads)[2], |_| false, turn_s) };
         rig.dive(SectorOffset, 0.1, 0.1).assert_in_step(2.0 * rig.step_rad());
@@ -286,7 +286,7 @@ fn heads_in_sectors_not_divisible_by_the_step_are_in_phase_within_two_pings() {
 }
 
 #[test]
-fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
+fn algorithm_1_gives_a_head_the_angle_of_the_lead_head_at_the_same_chainage() {
     for (of, (behind_m, speed_mps)) in (2..=6_usize)
         .flat_map(|of| [(0.0, 0.3), (0.3, 0.197), (1.102, 0.5), (3.7, 0.4), (-0.6, 0.197)].map(|at| (of, at)))
     {
@@ -315,7 +315,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
 }
 
 #[test]
-fn gaps_of_a_faster_vehicle_differ_by_the_phase_errors() {
+fn pass_gaps_above_the_planned_speed_differ_by_the_phase_errors() {
     let (turn_s, planned_mps, speed_mps) = (8.0, 0.197, 0.25);
     let pitch_m = speed_mps * turn_s;
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
@@ -351,7 +351,7 @@ proptest! {
 
     /// The speed differs from the planned one, so that the gaps differ from each other.
     #[test]
-    fn shifting_or_reversing_all_heads_does_not_change_the_gaps(
+    fn shifting_or_reversing_all_heads_does_not_change_the_pass_gaps(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]),
         shift_m in -3.0..3.0, speed_mps in 0.05..1.0, angle in 0.0..TAU,
     ) {
@@ -365,7 +365,7 @@ proptest! {
     }
 
     #[test]
-    fn schedule_agrees_with_stepping_each_program(
+    fn schedule_angles_match_stepping_each_head_ping_by_ping(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]), speed_mps in 0.05..1.0,
     ) {
         let schedule = Schedule::new(&rig.specs(), layout, speed_mps).unwrap();
@@ -441,7 +441,7 @@ fn step_of_zero_or_less_is_a_named_error_in_both_layouts() {
 }
 
 #[test]
-fn lead_outside_sector_0_is_a_named_error() {
+fn lead_head_outside_sector_0_is_a_named_error() {
     let sector = Sector { number: 1, of: 4, behind_m: 0.3, reversed: false };
     for angle_rad in [-0.1, 1.6, 6.2, f64::NAN] {
         let got = in_step(InSector { angle_rad, growing: true }, &sector, 8.0, 0.2);

@@ -96,7 +96,7 @@ fn condition(angle_rad: f64) -> f64 {
 
 /// Near 90 degrees, tangents are very large, so a formula that subtracts two tangents would lose all digits.
 #[test]
-fn steps_near_90_degrees_match_the_oracle() {
+fn wall_steps_near_90_degrees_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
     for row in rows(&["eq6"]) {
         worst = worst.max(row.share(section::t_y2_m(row.i(1), row.i(2), row.count(3)).unwrap()));
@@ -121,7 +121,7 @@ fn speeds_near_the_limit_match_the_oracle() {
 
 /// At a crawl, a head makes very many turns until the vehicle has brought it to the place of another head.
 #[test]
-fn phases_at_a_crawl_match_the_oracle() {
+fn head_phases_at_very_low_speed_match_the_oracle() {
     let (mut worst_rad, mut turned_most) = (0.0_f64, 0.0_f64);
     for row in rows(&["eq20", "eq21"]) {
         let [phase, rate, x, v] = [1, 2, 3, 4].map(|i| row.i(i));
@@ -188,7 +188,7 @@ fn forward_motion_matches_the_oracle() {
 }
 
 #[test]
-fn phases_of_heads_apart_along_the_hull_match_the_oracle() {
+fn phases_of_separately_mounted_heads_match_the_oracle() {
     for row in rows(&["eq20", "eq21"]) {
         let [phase, rate, x, v] = [1, 2, 3, 4].map(|i| row.i(i));
         let start = if row.case == "eq20" { start_rad } else { start_reversed_rad };

@@ -34,7 +34,7 @@ fn column(truth: &str, (key, value): (&str, &str), wanted: &str) -> Vec<String> 
 }
 
 #[test]
-fn sounder_measures_a_body_on_the_floor() {
+fn echosounder_measures_a_mesh_body_on_the_floor() {
     let folder = folder("file = \"box.ply\"\nname = \"car\"\nchainage_m = 5");
     folder.write("box.ply", cuboid());
     let arguments = ["simulate", "scene.toml", "-o", "dive.mcap", "--truth", "truth.csv"];
