@@ -165,7 +165,7 @@ struct Measured {
     ticks: Vec<Duration>,
     /// Durations of the work that the page's collector does after each tick.
     collecting: Vec<Duration>,
-    /// Times from the due time of a tick to the end of both the tick and the collector's work.
+    /// Times from a tick's due time to the end of both the tick and the collector's work after it.
     ends: Vec<Duration>,
     samples: u64,
     digest: u64,
@@ -400,7 +400,7 @@ impl Viewers {
         Self { reading, _never_reads: never_reads, flooding }
     }
 
-    /// Waits for the viewers' threads to end; the page must have ended before.
+    /// Waits for the viewers' threads to end; the page's server must have ended before.
     fn end(self) -> String {
         let seen: Vec<_> = self.reading.into_iter().map(|viewer| viewer.join().unwrap()).collect();
         let ended = seen.iter().filter(|(_, has_ended)| *has_ended).count();
@@ -412,7 +412,8 @@ impl Viewers {
     }
 }
 
-/// Sends as fast as possible and reconnects after each disconnection. Returns the number of messages sent.
+/// Floods the page: sends messages as fast as possible and reconnects after each disconnection. Returns the number of
+/// messages sent.
 fn flood(address: &str, is_over: &AtomicBool) -> u64 {
     let mut sent = 0;
     let message = Message::Text(json!({"do": "mark", "by": "flood"}).to_string().into());

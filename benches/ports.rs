@@ -34,7 +34,7 @@ const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const WARMING: DurNs = DurNs::from_millis(10_000);
 /// Default duration of each part, s.
 const MEASURED_S: u64 = 60;
-/// Longest time for which the devices wait for a host's bytes, ns.
+/// Longest time for which an emulated device waits for bytes from the host, ns.
 const WAIT_NS: u32 = 1_000_000;
 
 const WAY: &str = "[trajectory]\n[[trajectory.legs]]\ndistance_m = 60\nspeed_mps = 0.1\n";
@@ -219,7 +219,7 @@ impl Driver for Timed {
     }
 }
 
-/// Reference: reads data as it arrives and records the delay.
+/// The bare read loop, which is the reference: reads data as it arrives and records the delay.
 fn bare(connect: &Connect, finish: Finish) {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => {
@@ -349,7 +349,7 @@ impl Ends {
 
 /// Results of one part of the bench.
 struct Measured {
-    /// Delays of the driver and of the reference, for each sensor.
+    /// Delays of messages through the driver and through the bare read loop, for each sensor.
     delays: Vec<[Vec<DurNs>; 2]>,
     /// Delays of the driver to the end of the tick, and of the reference to the end of a pass of the empty loop.
     ends: Vec<[Vec<DurNs>; 2]>,

@@ -114,7 +114,7 @@ impl<'a> ByHand<'a> {
         }
     }
 
-    /// Casts every ray and sends its message.
+    /// Casts every ray and sends the message of its return.
     fn dive(&mut self) -> Said {
         let mut said = Said::default();
         let mut until = START;

@@ -20,7 +20,7 @@ const ROUNDS: usize = 9;
 
 const SPEED_MPS: f64 = 0.11;
 
-/// Every effect with some parameters; heads turn in sectors, so that `sector_end_slowing` applies.
+/// Every simulator effect with some parameters. Heads sweep sectors, so that `sector_end_slowing` applies.
 const EFFECTS: [(&str, &str); 38] = [
     ("mount_error", "angles_sd_deg = 0.2"),
     ("start_phase_error", "max_deg = 20"),
@@ -79,7 +79,7 @@ fn main() {
     }
 }
 
-/// VITA 2 with four heads over `length_m` metres.
+/// Scene in which VITA 2 with four heads moves over `length_m` metres.
 fn scene(length_m: f64, layout: &str, rest: &str) -> Scene {
     scenes::scene(&text(length_m, layout, rest))
 }
@@ -114,7 +114,7 @@ fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) 
     least
 }
 
-/// Cost of each effect, alone and among all the others.
+/// Measures the CPU time of each simulator effect, alone and in addition to all other effects.
 fn cost() {
     const LENGTH_M: f64 = 12.0;
     let returns = 4.0 * 50.0 * LENGTH_M / SPEED_MPS;

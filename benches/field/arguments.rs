@@ -17,7 +17,7 @@ pub(crate) struct Arguments {
     pub(crate) cell: Vec<String>,
     /// Number of dives of each cell.
     pub(crate) seeds: u64,
-    /// The first seed.
+    /// Seed of the first dive of each cell.
     pub(crate) from_seed: u64,
     /// Length of each dive, m; it overrides the vehicle's own length.
     pub(crate) metres: Option<f64>,
@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn of(words: impl Iterator<Item = String>) -> Self {
-        // Cargo adds `--bench`.
+        // Cargo adds the argument `--bench`, which is ignored.
         let mut words = words.filter(|word| word != "--bench");
         let mut seeds = None;
         let json = headrace_tests::root().join("target/field.json");

@@ -39,13 +39,13 @@ impl PacketSource for Partly {
     }
 }
 
-/// Advice at each update, with the results of the dive.
+/// Advice at each update of a dive, with the dive's report and digest.
 pub struct Advised {
-    /// Advice at each update.
+    /// Advice at each update of the dive.
     pub beats: Vec<AdviceEntry>,
     /// Report of the dive.
     pub report: Report,
-    /// Digest of the dive.
+    /// Digest of the dive's results.
     pub digest: u64,
 }
 

@@ -19,7 +19,7 @@ const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const WAIT_NS: u32 = 1_000_000;
 const BAUD: u32 = 115_200;
 
-/// A fault of a line, which changes the data on that line.
+/// A fault of a line between device and host, which changes the data on that line.
 pub trait Fault: Send {
     /// Sends frame `number` of the device to the host.
     fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
@@ -27,12 +27,12 @@ pub trait Fault: Send {
         line.whole(frame);
     }
 
-    /// Takes bytes from the host and returns the bytes that reach the device.
+    /// Takes bytes that the host sent, and returns the bytes that reach the device.
     fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
         bytes
     }
 
-    /// Runs in every cycle between frames.
+    /// Hook that runs in every cycle between the device's frames.
     fn meanwhile(&mut self, line: &mut Wire) {
         let _ = line;
     }
@@ -54,7 +54,7 @@ pub struct End {
 }
 
 impl End {
-    /// A serial port with a stable name in `folder`, like udev's links by identity.
+    /// Creates the end of a serial port with a stable name in `folder`, like udev's links by identity.
     pub fn serial(folder: &std::path::Path, name: &str) -> Self {
         let link = folder.join(name);
         let port = SerialPort::Path(link.display().to_string());
@@ -68,12 +68,12 @@ impl End {
         end
     }
 
-    /// A TCP port on this machine.
+    /// Creates the end of a TCP port on this machine.
     pub fn tcp() -> Self {
         Self::of_network(Carrier::Tcp)
     }
 
-    /// A UDP port on this machine.
+    /// Creates the end of a UDP port on this machine.
     pub fn udp() -> Self {
         Self::of_network(Carrier::Udp)
     }
@@ -152,7 +152,7 @@ impl Control {
         self.unplugged.store(false, Ordering::SeqCst);
     }
 
-    /// Makes the device silent from now on.
+    /// Makes the device send nothing from now on.
     pub fn fall_silent(&self) {
         self.silent.store(true, Ordering::SeqCst);
         while !self.quiet.load(Ordering::SeqCst) {
@@ -160,7 +160,7 @@ impl Control {
         }
     }
 
-    /// Ends the silence.
+    /// Ends the device's silence.
     pub fn speak(&self) {
         self.quiet.store(false, Ordering::SeqCst);
         self.silent.store(false, Ordering::SeqCst);
@@ -171,13 +171,13 @@ impl Control {
         self.healed.store(true, Ordering::SeqCst);
     }
 
-    /// Number of frames sent whole.
+    /// Number of frames that the device has sent whole.
     pub fn whole(&self) -> u64 {
         self.whole.load(Ordering::SeqCst)
     }
 }
 
-/// The device's end of the line, as faults see it.
+/// The device's end of the line, with the operations that faults may use.
 pub struct Wire {
     end: End,
     control: Arc<Control>,

@@ -1,4 +1,4 @@
-//! The field scene with settings that suit it, and the errors of the estimated trajectory.
+//! The scene `vita1-field` with settings that suit it, and the errors of the estimated trajectory.
 
 use headrace_fusion::Fix;
 use headrace_geometry::frames::{Tunnel, Vec3};
@@ -30,7 +30,7 @@ pub struct Figures {
     pub yaw_deg: f64,
     /// Errors of roll and pitch together, degrees.
     pub tilt_deg: f64,
-    /// Share of pings with a fix, 0 to 1.
+    /// Fraction of pings with a position fix, 0 to 1.
     pub fixed: f64,
 }
 
@@ -44,7 +44,7 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     math::sqrt(sum / f64::max(n, 1.0))
 }
 
-/// Errors of a dive's fixes against the truth.
+/// Errors of a dive's position fixes against the truth.
 pub fn figures(track: &Track) -> Figures {
     let known: Vec<_> = track.fixes.iter().filter_map(|t| Some((t.at, t.fix.ok()?, t.truth))).collect();
     let off: Vec<Vec3<Tunnel>> =
@@ -65,7 +65,7 @@ pub fn figures(track: &Track) -> Figures {
     }
 }
 
-/// Errors of the displacement during one turn, with their reported standard deviations.
+/// Errors of the vehicle's displacement during one turn of a head, with their reported standard deviations.
 pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
     let mut before = 0;
     let mut turns = Vec::new();
@@ -111,7 +111,7 @@ pub fn field(seed: u64, length_m: f64) -> Scene {
     field_with(seed, length_m, SETTINGS, "")
 }
 
-/// The field scene with other settings, and without the line `without`.
+/// The field scene with the `[navigation]` settings `settings`, and without the text `without`.
 pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Scene {
     let scene = include_str!("../../deploy/scenes/vita1-field.toml");
     let length = format!("distance_m = {length_m}");

@@ -25,7 +25,7 @@ pub const PARTS: u32 = 16;
 /// Tolerance of the chainage from which all heads have passed the wall, m. The program updates this chainage five times
 /// a second, and takes the farthest wall as the reach of a tilted head.
 pub const NEAR_M: f64 = 0.12;
-/// Length below which a backward motion counts as sway, m.
+/// Distance below which a backward motion of the vehicle counts as sway, m.
 const WAY_BACK_M: f64 = 0.05;
 
 /// Range of chainages at which the heads can hit the wall at a moment.
@@ -33,9 +33,9 @@ const WAY_BACK_M: f64 = 0.05;
 pub struct Reached {
     /// Time at which the heads have this reach.
     pub at: MonoNs,
-    /// Smallest chainage at which a head can lay a sample, m.
+    /// Smallest chainage at which any head can sample the wall, m.
     pub rear_m: f64,
-    /// Largest chainage at which a head can lay a sample, m.
+    /// Largest chainage at which any head can sample the wall, m.
     pub front_m: f64,
 }
 
@@ -188,7 +188,7 @@ impl Journey {
         let section = report.sections.iter().find(|section| section.start_m >= flag.start_m);
         let Some((section, raised_s)) = section.zip(flag.raised_s) else { return false };
         let raised = MonoNs(math::round_to_i64(raised_s * 1e9).unsigned_abs());
-        // The maximum over several pings is used, because places and attitudes have navigation noise.
+        // The maximum reach over several pings is used, because estimated positions and attitudes are noisy.
         let near = |ping: &&Ping| raised.since(ping.received).0.abs() <= EVERY.0;
         let poses = dive.pings.iter().filter(near).filter_map(|ping| ping.pose);
         let rear_m = poses.map(|pose| ends_m(dive, &pose)[0]).fold(f64::MIN, f64::max);

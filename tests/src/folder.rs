@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::short_dive::{SCENE, VEHICLE};
 
-/// Longest wait for the expected report of a dive, s.
+/// Longest duration of a live dive that a test repeats until the report is as expected, s.
 const LONG_S: u32 = 100;
 
 /// The program under test, ready for arguments.
@@ -104,7 +104,7 @@ impl Folder {
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     }
 
-    /// Records a replay of the log of `vehicle.toml` as a live dive, as fast as possible. Returns the answer.
+    /// Runs the log `from` as a live dive of `vehicle.toml`, as fast as possible, and records it to the log `to`.
     #[track_caller]
     pub fn record(&self, from: &str, to: &str, further: &[&str]) -> Answer {
         let arguments = ["run", "vehicle.toml", "--source", from, "--record", to, "--speed", "max"];
@@ -124,7 +124,7 @@ impl Folder {
         assert!(!self.path("dive.mcap").exists(), "a refused scene leaves no log");
     }
 
-    /// Exit code and report of `replay LOG --json` with further arguments.
+    /// Runs `replay LOG --json` with further arguments; returns exit code and report.
     pub fn replay(&self, log: &str, further: &[&str]) -> (Option<i32>, Value) {
         let answer = self.headrace(&[&["replay", log, "--json"], further].concat());
         let report = serde_json::from_str(&answer.stdout)

@@ -1,4 +1,4 @@
-//! Deterministic damage to bytes on bad lines.
+//! Line faults that damage bytes, drawn from a fixed seed.
 
 use headrace_imagenex881::codec::{Model, ReturnCodec, Returns};
 use headrace_ping1d::codec::PingCodec;

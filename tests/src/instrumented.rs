@@ -21,7 +21,7 @@ use crate::scenes;
 /// A sonar return with its place on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// Chainage and arc length, m.
+    /// Place of the return on the unrolled wall: chainage and arc length, m.
     pub place: [f64; 2],
     /// Place of the return in the tunnel's frame, m.
     pub point: [f64; 3],
@@ -38,7 +38,7 @@ pub struct Ping {
     pub new_sweep: bool,
     /// Whether the head has moved by exactly one step since the previous ping.
     pub single_step: bool,
-    /// Pose of the vehicle, if known.
+    /// Estimated pose of the vehicle at the ping, if known.
     pub pose: Option<Pose>,
     /// The ping's return, if the loop accepted it as wall and placed it.
     pub sample: Option<Sample>,
@@ -54,7 +54,7 @@ pub struct Dive {
     pub report: Report,
     /// Cross-section of the tunnel in the loop's configuration.
     pub profile: Profile,
-    /// Mounts of the heads, by number.
+    /// Mount of each head, by number of the head.
     pub mounts: Vec<Mount>,
     /// Range of each head at the site's speed of sound, m.
     pub ranges_m: Vec<f64>,
@@ -112,7 +112,7 @@ impl Seen {
         }
     }
 
-    /// Adds a classified return to its ping.
+    /// Adds a return that the loop has classified to its ping.
     fn note_return(&mut self, words: &[u64], is_wall: bool) {
         let [received, source, _, place @ ..] = words else { panic!("a ping's words") };
         let [x_m, y_m, z_m, arc_m] = [0, 1, 2, 3].map(|k| f64::from_bits(place[k]));

@@ -19,10 +19,10 @@ const WITHIN: Duration = Duration::from_mins(2);
 
 const SCHEMA: &str = include_str!("../../docs/reference/page-feed.schema.json");
 
-/// A running program with a page, killed when it goes out of scope.
+/// A running program that serves the page. It is killed when this value goes out of scope.
 pub struct Serving {
     child: Child,
-    /// Host and port of the page.
+    /// Host and port at which the program serves the page.
     pub address: String,
     /// Standard input of the program.
     pub stdin: Option<ChildStdin>,
@@ -171,7 +171,7 @@ pub struct Viewer {
     schema: Value,
 }
 
-/// Differences between a text message and the schema of its type.
+/// Violations by a text message of the schema for its type.
 fn faults(schema: &Value, text: &Value) -> Vec<String> {
     let of_type = schema["anyOf"].as_array().unwrap().iter().find(|one| {
         let definition = one["$ref"].as_str().unwrap().strip_prefix('#').unwrap();
@@ -184,7 +184,7 @@ fn faults(schema: &Value, text: &Value) -> Vec<String> {
 }
 
 impl Viewer {
-    /// Connects with this query, which begins with `?` or is empty.
+    /// Connects to the page with this URL query, which begins with `?` or is empty.
     pub fn connect(
         serving: &Serving,
         query: &str,
@@ -226,7 +226,8 @@ impl Viewer {
         })
     }
 
-    /// Reads until `holds` returns true. Panics if the connection ends or the time is over before that.
+    /// Reads messages until `holds` returns true. Panics if the connection ends or the time limit is reached before
+    /// that.
     #[expect(clippy::disallowed_methods, reason = "the wait would never end")]
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) {
         let began = std::time::Instant::now();
@@ -238,7 +239,7 @@ impl Viewer {
         }
     }
 
-    /// Reads until a message of this type arrives.
+    /// Reads messages until one of this type arrives.
     pub fn until_type(&mut self, kind: &str) -> Value {
         let before = self.others.len();
         self.until(kind, |viewer| viewer.others[before..].iter().any(|other| other["type"] == kind));
@@ -258,7 +259,7 @@ impl Viewer {
         }
     }
 
-    /// Reads until the dive has begun; before that, a replay can't be controlled.
+    /// Reads messages until the dive has begun; before that, a replay can't be controlled.
     pub fn until_begun(&mut self) {
         self.until("a state", |viewer| !viewer.state.is_null());
     }

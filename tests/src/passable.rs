@@ -44,7 +44,7 @@ pub struct Outing {
     pub effects: String,
     /// Seed of the dive.
     pub seed: u64,
-    /// Chainage of the start, m.
+    /// Chainage at which the dive starts, m.
     pub start_m: f64,
     /// Fraction of the planned speed. The heads are in phase for this reduced speed, and the vehicle drives at it
     /// before the first advice.
@@ -71,7 +71,7 @@ pub struct Outcome {
 pub struct Compared {
     /// Planned speed, m/s.
     pub plan_mps: f64,
-    /// Advised speed while driving at the planned speed, m/s.
+    /// Advised speed while the vehicle drives at the planned speed, m/s.
     pub advised_mps: f64,
     /// Largest speed near the advised one at which sections truly pass, m/s; `None` if there is none.
     pub true_mps: Option<f64>,

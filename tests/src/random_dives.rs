@@ -9,11 +9,11 @@ use headrace_geometry::math;
 pub enum Kind {
     /// A dive without errors.
     Ideal,
-    /// Noise on everything, a drifting pilot, missing and false returns.
+    /// Noise on all sensors, a drifting pilot, missing returns, and false returns.
     Noisy,
     /// Heads that sweep back and forth in sectors.
     Sectors,
-    /// A hull and heads that hide the wall from each other.
+    /// Heads whose view of the wall is blocked by the hull and by other heads.
     Occluded,
     /// A vehicle that goes forward, back, and forward again.
     Reversing,

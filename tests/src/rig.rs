@@ -46,7 +46,7 @@ pub const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 
 pub const PING: &str = "plugin = \"ping1d\"\ninterval_ms = 50\n";
 /// A cable counter that reports by UDP.
 pub const COUNTER: &str = "plugin = \"tether_hid\"\ncounts_per_metre = 2000\nrate_hz = 50\n";
-/// A depth sensor on a bus.
+/// A depth sensor (Bar100).
 pub const DEPTH: &str = "plugin = \"bar100\"\n";
 
 /// A sensor for a [`Rig`]: its table in the vehicle file, the device's end of the line, and the line's fault.
@@ -151,12 +151,12 @@ impl Rig {
         self.devices[self.on[number]].control()
     }
 
-    /// View of the dive at the latest update.
+    /// State of the dive at the latest update.
     pub fn view(&self) -> &View {
         &self.view
     }
 
-    /// Runs the dive until `condition` is true; returns the view.
+    /// Runs the dive until `condition` is true; returns the state of the dive.
     #[track_caller]
     pub fn until(&mut self, what: &str, condition: impl Fn(&View) -> bool) -> View {
         let Self { dive, supervisor, devices, on, view, places, .. } = self;
@@ -229,7 +229,7 @@ impl Ended {
         assert!(lines.iter().all(|line| line.dropped == 0), "{lines:#?}");
     }
 
-    /// Checks that this sensor had no fault and no loss.
+    /// Checks that this sensor reported no fault and lost no data.
     #[track_caller]
     pub fn untroubled(&self, number: usize) {
         let (line, said) = (&self.lines[number], &self.view.said[number]);
@@ -303,7 +303,7 @@ fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, O
     (app.arm(vehicle.navigation()).unwrap(), handle)
 }
 
-/// The emulated device of a sensor, for a dive in another process.
+/// Creates the emulated device of a sensor, for a dive in another process.
 pub fn emulated(text: &str) -> Emulated {
     let text = format!("{HEADING}\n[[sensors]]\nid = \"s0\"\n{text}");
     let document = Document::new("vehicle.toml", &text);

@@ -57,7 +57,7 @@ impl Screen {
         command.envs(variables.iter().copied());
         command.stdin(end()).stdout(end()).stderr(end());
         let child = command.spawn().unwrap();
-        // As long as the command exists, it keeps the terminal open, even after the program's end.
+        // As long as the `Command` value exists, it keeps the terminal open, even after the program's end.
         drop(command);
         let mut reading = clone(&master);
         let (to, coming) = channel();
@@ -80,7 +80,7 @@ impl Screen {
         String::from_utf8_lossy(&seen).into_owned()
     }
 
-    /// Waits for a text; returns the output up to this text.
+    /// Waits until the program prints a text; returns the output up to this text.
     #[track_caller]
     pub fn until(&self, text: &str) -> String {
         for _ in 0..STEPS {

@@ -44,7 +44,7 @@ pub struct Epoch {
     pub errors: Errors,
 }
 
-/// Records of a dive's navigation.
+/// Recorded position fixes and estimates of a dive's navigation.
 pub struct Track {
     /// Position fixes in the order in which the loop requested them.
     pub fixes: Vec<Tracked>,
@@ -73,7 +73,7 @@ enum Said {
     Consistency(usize, Consistency),
 }
 
-/// A navigation whose estimates can be observed.
+/// A navigation whose filter states can be observed by a test.
 pub trait Transparent: Navigation + 'static {
     /// Latest filter state and its time, if the navigation has a state.
     fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
@@ -175,7 +175,7 @@ impl<N: Transparent> Navigation for RecordedNavigation<N> {
     }
 }
 
-/// The filter with a scene's settings.
+/// The navigation filter with the settings of a scene's vehicle.
 pub fn filter(scene: &Scene) -> FilterNavigation {
     let vehicle = &scene.vehicle;
     let settings = match vehicle.navigation {

@@ -32,7 +32,7 @@ use crate::blocks::Blocks;
 use crate::timed;
 use crate::truth::{Truth, TruthTaker};
 
-/// Samples count for a section's chainage offset up to this distance from the section, m.
+/// Samples within this distance of a section are used for the section's chainage offset, m.
 const NEAR_M: f64 = 1.0;
 
 /// Packets sent by the devices, in order of time.
@@ -70,7 +70,7 @@ impl Packets {
 pub struct PacketFeed<'a> {
     packets: &'a Packets,
     next: usize,
-    /// Offset of the next packet's bytes.
+    /// Offset of the next packet's bytes among the bytes of all packets.
     from: usize,
 }
 
@@ -111,19 +111,19 @@ pub struct Recorded {
 pub struct JudgedSection {
     /// The section as reported by the loop.
     pub report: SectionRow,
-    /// D_true, m; infinite without samples.
+    /// True hole diameter D_true, m; infinite without samples.
     pub true_hole_m: f64,
-    /// True minus estimated chainage, m.
+    /// Chainage offset of the section: true minus estimated chainage, m.
     pub shift_m: f64,
 }
 
 /// Report of a dive, and the truth of the dive's sections.
 pub struct JudgedDive {
-    /// Report from the loop.
+    /// Report of the dive from the loop.
     pub report: Report,
     /// True places where beams met the wall.
     pub truth: Arc<Truth>,
-    /// All sections, in order.
+    /// All sections of the report, in order.
     pub sections: Vec<JudgedSection>,
 }
 
@@ -168,7 +168,7 @@ impl Recorded {
         })
     }
 
-    /// Time from the first to the last packet, s.
+    /// Duration of the dive, from the first to the last packet, s.
     pub fn duration_s(&self) -> f64 {
         let ends = self.packets.list.first().zip(self.packets.list.last());
         ends.map_or(0.0, |((first, ..), (last, ..))| last.since(*first).as_secs_f64())

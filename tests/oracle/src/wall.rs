@@ -27,12 +27,12 @@ impl HasPosition for Vertex {
     }
 }
 
-/// A circle without samples.
+/// A circle on the unrolled wall that contains no samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circle {
-    /// Centre: chainage and arc length, m.
+    /// Centre of the circle: chainage and arc length, m.
     pub centre: Place,
-    /// Radius, m.
+    /// Radius of the circle, m.
     pub radius_m: f64,
 }
 

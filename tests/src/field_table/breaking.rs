@@ -1,4 +1,4 @@
-//! The fault of one device, drawn from a seed.
+//! A random fault of one device of a vehicle, drawn from a seed.
 
 use headrace_geometry::math;
 use headrace_sensor::device::Sense;
@@ -25,13 +25,13 @@ pub struct DeviceFault {
     pub from_s: f64,
     /// Duration of the fault, seconds; `None` means to the end of the dive.
     pub for_s: Option<f64>,
-    /// Size of a jump: degrees for a head or an inertial unit, m for other devices.
+    /// Size of the fault `jump`: degrees for a head or an inertial unit, m for other devices.
     pub size: f64,
 }
 
 impl DeviceFault {
-    /// The fault of a seed in a dive of this duration. Senses and faults rotate with the seed; all other values are
-    /// drawn.
+    /// The fault that belongs to a seed, in a dive of this duration. Senses and faults rotate with the seed; all other
+    /// values are drawn.
     pub fn of(seed: u64, plain: &Scene, duration_s: f64) -> Self {
         let mut draw = Draw::new(seed ^ 0xb4ea_4a6e);
         let turn = usize::try_from(seed).unwrap();

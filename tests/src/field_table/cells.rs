@@ -20,11 +20,11 @@ pub struct Vehicle {
     pub name: &'static str,
     /// File name in `deploy/vehicles`.
     pub file: &'static str,
-    /// Mode of the heads.
+    /// Mode of the heads, such as "fast".
     pub mode: &'static str,
     /// Target T, m.
     pub target_m: f64,
-    /// Layout of the heads.
+    /// Layout of the heads: phase shift or sectors.
     pub layout: &'static str,
     /// Default length of a dive, m. It is larger for vehicles whose passes are far apart.
     pub length_m: f64,
@@ -87,7 +87,7 @@ pub enum Condition {
     /// As `DataSheet`, but the vehicle file states the true sensor noises. The file allows for no rough walls, tilt or
     /// cable slack.
     Told,
-    /// A MEMS unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error, and steel
+    /// A MEMS inertial unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error; steel
     /// nearby.
     Poor,
     /// Runs of lost returns, returns from objects in front of the wall, and second echoes.
@@ -106,9 +106,9 @@ pub enum Condition {
     WrongWall,
     /// The data of a sensor arrive 0.3 s late.
     WrongLatency,
-    /// The cable's counter reads 2 % too much.
+    /// The cable counter reads 2 % too much.
     WrongCable,
-    /// The inertial unit is a MEMS one, but the vehicle file names a better one.
+    /// The inertial unit is a MEMS unit, but the vehicle file names a better unit.
     WrongUnit,
     /// The cable hangs, but the vehicle file states that it is taut.
     WrongSlack,
@@ -147,7 +147,7 @@ pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900
 pub enum Driven {
     /// At the speed that `plan --write` gives for the cell's mode and target.
     Planned,
-    /// As `Planned`, after a stationary phase at the start.
+    /// At the planned speed, after a stationary phase at the start.
     Stood,
     /// At this multiple of the largest speed by the paper's Eq. 16, with the heads in phase for the planned speed.
     Times(f64),
@@ -174,7 +174,7 @@ pub struct Cell {
     pub vehicle: Vehicle,
     /// Condition of the cell: sensor errors, wall and driving.
     pub condition: Condition,
-    /// Chainage of the start, m.
+    /// Chainage at which the dive starts, m.
     pub start_m: f64,
     /// Chainage at which the vehicle is launched, m, if it drives from there to `start_m`.
     pub let_in_m: Option<f64>,
@@ -199,7 +199,7 @@ const XSENS: &str = "imu_noise = { gyro_degps_rthz = 0.0077, accel_mps2_rthz = 0
      imu_bias = { gyro_degps = 0.0022, accel_mps2 = 0.002, tau_s = 300, gyro_constant_degps = 0.05, accel_constant_mps2 = 0.02 }\n";
 const AUTOPILOT: &str = "imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.003, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.03, tau_s = 1000 }\n";
-/// Source: field.md, "poor".
+/// Noise and biases of the MEMS inertial unit. Source: field.md, "poor".
 const MEMS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.02, tau_s = 300 }\n";
 /// Settings of the vehicle file for the MEMS inertial unit.
@@ -293,7 +293,8 @@ impl Cell {
             told.replace("counts_per_metre = 2000", &format!("counts_per_metre = {count:.1}"))
         };
         match self.condition {
-            // The counter reads less than its nominal scale, so that no chainage lies beyond the tunnel's end.
+            // The cable counter reads too little, not too much, so that no estimated chainage lies beyond the tunnel's
+            // end.
             Condition::Poor => counts(0.995),
             Condition::WrongCable => counts(0.98),
             Condition::WrongMount => {
@@ -461,7 +462,7 @@ impl Cell {
         murk
     }
 
-    /// Effect of the condition's single wrong setting or broken device.
+    /// Text of the simulator effect for the condition's single wrong setting or broken device.
     fn wrong(&self, plain: &Scene, seed: u64, duration_s: f64) -> String {
         let mut draw = Draw::new(seed);
         match self.condition {

@@ -29,7 +29,7 @@ const TOUCH_M: f64 = 0.02;
 /// A section that passed although its true hole exceeds the target.
 #[derive(Debug, Clone)]
 pub struct FalsePass {
-    /// Seed of the dive.
+    /// Seed of the dive in which the section passed.
     pub seed: u64,
     /// Chainage of the section's start, m.
     pub start_m: f64,
@@ -37,14 +37,14 @@ pub struct FalsePass {
     pub hole_m: [f64; 3],
     /// Reported position of the hole: chainage and clock position.
     pub at: (f64, String),
-    /// Number of returns that weren't accepted as wall.
+    /// Number of the section's returns that weren't accepted as wall.
     pub doubtful: u32,
 }
 
 /// Figures over all dives of a cell.
 #[derive(Debug, Clone, Default)]
 pub struct Figures {
-    /// Number of dives.
+    /// Number of dives of the cell.
     pub dives: u32,
     /// Number of sections, including sections at the ends of dives.
     pub sections: u32,
@@ -54,7 +54,7 @@ pub struct Figures {
     pub passed_over: u32,
     /// Number of passed sections with D_true over 1.1 times the target.
     pub passed_far: u32,
-    /// All passed sections with D_true over the target.
+    /// List of the passed sections with D_true over the target.
     pub falsely: Vec<FalsePass>,
     /// Number of sections with D_true below 0.9 times the target.
     pub under: u32,
@@ -102,7 +102,7 @@ impl Figures {
         self.tell(dive);
     }
 
-    /// Adds the figures of other dives.
+    /// Adds the figures of other dives of the same cell.
     pub fn join(&mut self, other: &Self) {
         self.dives += other.dives;
         self.sections += other.sections;
@@ -212,7 +212,7 @@ impl Figures {
         self.verdicts_m[verdict] / self.inner_m
     }
 
-    /// Fraction of the inner length with D_true within the target.
+    /// Fraction of the inner length with D_true within the target, 0 to 1.
     pub fn passable(&self) -> f64 {
         self.passable_m / self.inner_m
     }

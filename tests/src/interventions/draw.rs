@@ -14,7 +14,7 @@ pub(super) const START_M: f64 = 3.0;
 /// Distance that a vehicle drives beyond the far end, m. A vehicle that turns back too early stops this far
 /// short of the far end.
 const ON_M: f64 = 4.5;
-/// Distance in which the vehicle rolls before a rolled pass, m.
+/// Distance over which the vehicle rolls to its new roll angle before a rolled pass, m.
 const ROLLS_OVER_M: f64 = 1.0;
 
 /// Tables of the sensors that determine the vehicle's position. No part of the hull hides them.
@@ -55,7 +55,7 @@ counts_per_metre = 2000
 #[expect(missing_docs, reason = "the variants name their fields")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Injected {
-    /// A stretch that is driven at this multiple of the dive's speed.
+    /// The vehicle drives over a stretch at this multiple of the dive's speed.
     TooFast { over_m: [f64; 2], factor: f64 },
     /// A mode of the heads with coarser angular steps.
     AngularStep { mode: &'static str },
@@ -70,7 +70,7 @@ pub enum Injected {
     Aside { over_m: [f64; 2], by_m: [f64; 2] },
     /// The vehicle yaws back and forth.
     Swing { over_m: [f64; 2], yaw_deg: f64, every_s: f64 },
-    /// Phase offsets of the heads, degrees.
+    /// The heads start with these phase offsets, degrees.
     Phase { offsets_deg: Vec<f64> },
     /// A head that stalls now and then.
     HeadStalled { head: usize, per_hour: f64 },
@@ -83,7 +83,7 @@ pub enum Injected {
 }
 
 impl Injected {
-    /// The cause that the program should find.
+    /// Cause that the program should report for the injected cause.
     pub fn cause(&self) -> Cause {
         match self {
             Self::TooFast { .. } => Cause::TooFast,
@@ -209,7 +209,7 @@ pub const KINDS: [Cause; 11] = [
 ];
 
 impl Drawn {
-    /// The dive of a seed with these kinds of causes, given as indices of [`KINDS`].
+    /// Draws the dive of a seed with these kinds of causes, given as indices of [`KINDS`].
     pub fn of(seed: u64, kinds: &[usize]) -> Self {
         let mut draw = Draw::new(seed);
         let causes: Vec<Cause> = kinds.iter().map(|kind| KINDS[*kind]).collect();
@@ -254,7 +254,7 @@ impl Drawn {
         drawn
     }
 
-    /// The same dive with another noise, selected by number.
+    /// The same dive with other random noise, selected by number.
     #[must_use]
     pub fn with_noise(&self, noise: u64) -> Self {
         Self { noise: self.seed + 1_000_000 * noise, ..self.clone() }

@@ -7,10 +7,10 @@ use headrace_coverage::Cause;
 
 use super::{InterventionDive, Right};
 
-/// Counts of all answers and of right answers.
+/// Number of the program's answers, and how many of them are right.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Count {
-    /// Number of answers.
+    /// Number of all answers.
     pub all: u32,
     /// Number of right answers.
     pub right: u32,
@@ -28,7 +28,7 @@ impl Count {
         Self { all: self.all + other.all, right: self.right + other.right }
     }
 
-    /// Text such as "3 of 4 (75.0 %)".
+    /// The count as text, such as "3 of 4 (75.0 %)".
     pub fn text(self) -> String {
         format!("{} of {} ({:.1} %)", self.right, self.all, 100.0 * self.share())
     }

@@ -28,7 +28,7 @@ const JOIN_M: f64 = 0.5;
 /// A hole up to this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
-/// Alternative sets of causes, each one sorted. Any of these sets is right.
+/// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of them.
 pub type Right = Vec<Vec<Cause>>;
 
 /// A failed section with true and displayed causes.
@@ -42,17 +42,17 @@ pub struct Judged {
     pub told: Vec<Cause>,
     /// Number of the run of sections to which the section belongs.
     pub run: Option<u32>,
-    /// Diameter of the hole, m.
+    /// Diameter of the section's hole, m.
     pub hole_m: f64,
     /// Diameter of the hole with one injected cause removed, one value per cause, m; infinite if the hole can't
     /// be measured.
     pub without_m: Vec<f64>,
-    /// Evidence for the displayed causes.
+    /// Evidence that the program reports for the displayed causes.
     pub evidence: Evidence,
 }
 
 impl Judged {
-    /// Whether the displayed causes are right.
+    /// Whether the displayed causes equal one of the right sets.
     pub fn is_right(&self) -> bool {
         self.right.contains(&self.told)
     }
@@ -65,7 +65,7 @@ impl Judged {
     }
 }
 
-/// A dive with its failed sections.
+/// A drawn dive with its failed sections, and the true and displayed causes of these sections.
 pub struct InterventionDive {
     /// The dive as drawn from its seed, with its final target.
     pub drawn: Drawn,

@@ -36,7 +36,7 @@ impl Clock {
     }
 }
 
-/// A cable between the machine and one device.
+/// A simulated cable between the machine and one device.
 pub struct Cable {
     /// Address at which the simulated machine opens the cable.
     pub connect: Connect,
@@ -52,7 +52,7 @@ pub struct Cable {
     breaks: AtomicU64,
     /// Error that lines return after the last break, as an index of [`FAILURES`].
     failure: AtomicU64,
-    /// Number of lines opened so far.
+    /// Number of times that the machine has opened the cable so far.
     opened: AtomicU64,
     /// Number of unread datagrams that the machine has dropped since the last query.
     unread: AtomicU64,
@@ -79,7 +79,7 @@ impl Cable {
         }
     }
 
-    /// Breaks the connection; unread data is lost.
+    /// Breaks the cable's connection; unread data is lost.
     pub fn break_off(&self, failure: usize) {
         while self.to_host.pop().is_some() {}
         self.failure.store(failure as u64, Ordering::SeqCst);
@@ -168,7 +168,7 @@ impl Line for OpenCable {
         self.cable.unread.swap(0, Ordering::SeqCst)
     }
 
-    /// Exchanges one message as over UDP. The answer arrives as one message, too, with its own length.
+    /// Exchanges one message with the device, as over UDP. The answer also arrives as one message with its own length.
     fn exchange(
         &mut self,
         write: &[u8],

@@ -35,7 +35,7 @@ pub struct Device {
 }
 
 impl Device {
-    /// Creates a device that is switched on. With `loses`, frames are also lost without a planned fault.
+    /// Creates a device that is switched on. If `loses` is set, frames are also lost without a planned fault.
     pub fn new(
         emulated: Emulated,
         cable: Arc<Cable>,
@@ -148,7 +148,7 @@ impl Device {
         self.put(arrives, frame);
     }
 
-    /// Loses some bytes of a frame on a stream, or the whole frame on a message carrier.
+    /// Loses some bytes of a frame on a byte stream, or the whole frame on a carrier that keeps messages whole.
     fn lose_some(&mut self, now: MonoNs, mut frame: Vec<u8>) {
         if self.is_stream {
             let from = self.random.below(frame.len());

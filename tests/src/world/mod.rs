@@ -82,7 +82,7 @@ const SENSORS: [&str; 6] = [
 /// Size of the recorder's queue, bytes. It is so small that a stall of some seconds fills the queue.
 const QUEUE_BYTES: usize = 128 * 1024;
 
-/// The vehicle file of all worlds.
+/// The vehicle file of all simulated worlds.
 pub fn vehicle_text() -> String {
     let mut text = TUNNEL.to_owned();
     for (number, sensor) in SENSORS.iter().enumerate() {
@@ -158,11 +158,11 @@ pub struct Replayed {
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// Losses that the player reported.
+    /// Losses that the replay reported.
     pub losses: Vec<String>,
 }
 
-/// Result of a device's line.
+/// Result of the line of one device.
 #[derive(Debug)]
 pub struct Line {
     /// Whether the plan has no fault for the device.
@@ -183,7 +183,7 @@ impl World {
         Self::sabotaged(seed, None)
     }
 
-    /// As [`World::new`]; the sabotage breaks an invariant.
+    /// As [`World::new`], but with a sabotage that breaks an invariant.
     pub fn sabotaged(seed: u64, sabotage: Option<Sabotage>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
@@ -446,7 +446,7 @@ fn assemble(
     (app.arm(vehicle.navigation()).unwrap(), worker, notices)
 }
 
-/// Does the work of a line service's thread up to the point where the thread would wait.
+/// Does the work of a line service's thread until the thread would wait.
 fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
     // The driver reads once in each round. The limit detects a driver that is due again at once in every round; a real
     // thread would never wait.

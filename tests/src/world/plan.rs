@@ -1,4 +1,4 @@
-//! Faults of a world, drawn from its seed.
+//! Faults in a simulated world, drawn from the world's seed.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 use crate::random::Random;
 
-/// Time at which dives start; the machine was switched on some time before.
+/// Time of the simulated clock at which dives start; the machine was switched on some time before.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 /// Period at the start of a dive in which faults begin, ns.
 const BEGIN_WITHIN_NS: usize = 6_000_000_000;
@@ -84,7 +84,7 @@ const OF_MESSAGES: [CableFault; 9] = [
     CableFault::Deaf,
 ];
 
-/// Faults of the machine.
+/// Faults of the simulated machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MachineFault {
     /// The loop gets no CPU time.
@@ -104,7 +104,7 @@ const OF_MACHINES: [MachineFault; 4] = [
     MachineFault::TerminalStands,
 ];
 
-/// Faults of a disk.
+/// Faults of the simulated disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DiskFault {
     /// Writes to the disk fail.
@@ -143,7 +143,7 @@ pub enum Ending {
 pub struct Plan {
     /// Faults of each cable.
     pub cables: Vec<Vec<Window<CableFault>>>,
-    /// Faults of the machine.
+    /// Faults of the simulated machine.
     pub machine: Vec<Window<MachineFault>>,
     /// Faults of the disk.
     pub disk: Vec<Window<DiskFault>>,

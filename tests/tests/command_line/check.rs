@@ -92,7 +92,7 @@ fn findings(cases: &[(&str, &[(&str, &str)])]) -> String {
     for (what, changes) in cases {
         folder.write("vehicle.toml", changed(VEHICLE, changes));
         let answer = folder.headrace(&["check", "vehicle.toml"]);
-        // Errors suppress the summary; warnings don't.
+        // If `check` finds errors, it prints no summary; warnings don't suppress the summary.
         assert_eq!(answer.stdout.is_empty(), answer.code == Some(2), "{what}");
         write!(said, "{what}: {}\n{}", answer.code.unwrap(), answer.stderr).unwrap();
     }

@@ -4,7 +4,7 @@
 use headrace_tests::{Folder, root};
 use serde_json::Value;
 
-/// Output lines of a dive of the shipped vehicle along this scene's path.
+/// Output lines (JSON) of a dive in which the shipped vehicle follows this scene's path.
 fn told(scene: &str) -> Vec<Value> {
     let folder = Folder::new();
     let file = root().join("deploy/vehicles/vita2-4.toml");
@@ -60,7 +60,7 @@ fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
     assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
 }
 
-/// A dive with this speed on the way out and a high speed on the way back.
+/// A scene in which the vehicle drives out at this speed and goes back at a high speed.
 fn there_and_back(there_mps: f64) -> Vec<Value> {
     told(&format!(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
@@ -135,7 +135,7 @@ fn following_the_go_back_advice_clears_every_missed_section() {
     assert!(left_m < 0.1, "{left_m} m, {text}");
 }
 
-/// The totals include missed sections even if the dive ends on the way back.
+/// The report's totals include missed sections even if the dive ends on the way back.
 #[test]
 fn dive_that_ends_on_the_way_back_reports_its_missed_sections() {
     let lines = told(&missed_and_back(10.5, None));

@@ -37,7 +37,7 @@ fn recorded() -> (Folder, Value) {
     (folder, report)
 }
 
-/// View messages by topic, each checked against its schema.
+/// Messages under `/result/view/` by topic, each checked against its schema.
 fn view(log: &[u8]) -> BTreeMap<String, Vec<Value>> {
     let mut topics: BTreeMap<String, Vec<Value>> = BTreeMap::new();
     for message in MessageStream::new(log).unwrap().map(Result::unwrap) {
@@ -100,7 +100,7 @@ fn every_view_message_matches_its_schema_and_the_dive() {
     for cloud in &topics["points"] {
         for (head, [x_m, y_m, z_m]) in points_of(cloud) {
             assert!(head < 2 && (2.0..20.0).contains(&x_m), "head {head} at {x_m}");
-            // All points lie on a circle of 3 m radius whose lowest point is at z = 0.
+            // All points of the cloud lie on the tunnel's circle of 3 m radius, whose lowest point is at z = 0.
             assert!(((y_m * y_m + (z_m - 3.0) * (z_m - 3.0)).sqrt() - 3.0).abs() < 0.05, "{y_m}, {z_m}");
         }
     }

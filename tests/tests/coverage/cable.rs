@@ -29,7 +29,7 @@ struct Stuck {
     from_s: f64,
 }
 
-/// Draws a random dive. The expected holes vary from well below the target to well above it.
+/// Draws a random dive with a stuck cable counter. The expected holes vary from well below the target to well above it.
 fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     let mut draw = Draw::new(seed);
     let [least_mps, most_mps] = speeds_mps;

@@ -16,10 +16,10 @@ const SEEDS: u64 = 2;
 
 /// A scene that injects one cause.
 struct Case {
-    /// Expected cause in the report.
+    /// Cause that the report must state.
     cause: &'static str,
     what: &'static str,
-    /// Changes to VITA 2 with four heads.
+    /// Changes to the vehicle file of VITA 2 with four heads.
     changes: &'static str,
     way: &'static str,
     effects: &'static str,
@@ -108,7 +108,7 @@ const CASES: [Case; 11] = [
     },
 ];
 
-/// Number of failed sections by reported cause.
+/// Number of failed sections in the case's dive, by reported cause.
 fn named(case: &Case, seed: u64) -> BTreeMap<&'static str, u32> {
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.185");

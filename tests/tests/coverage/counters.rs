@@ -4,7 +4,7 @@ use headrace_coverage::Verdict;
 use headrace_simulator::Scene;
 use headrace_tests::{scenes, truth};
 
-/// Number of dives of each kind.
+/// Number of simulated dives of each kind.
 const DIVES: u64 = 8;
 /// Largest allowed error of the displayed speed, m/s. The tests guard against a fault that displayed 0.98 m/s for a
 /// vehicle at 0.2 m/s.
@@ -39,7 +39,7 @@ fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
     scenes::seeded(&text, &|name: &str| scenes::vehicle_file(name), Some(seed))
 }
 
-/// Wrong results of a dive.
+/// Wrong results of a dive: errors of displayed speed and of verdicts.
 #[derive(Debug, Default)]
 struct Wrong {
     /// Largest error of the displayed speed while there is a fix, m/s.

@@ -194,7 +194,7 @@ fn flags_wait_only_for_live_heads() {
     accounted_for("one of four", &one);
     for report in [&one, &none] {
         let judged = report.sections.iter().filter(|s| s.end_m <= 7.5);
-        // Near the start and the end, not all heads have passed.
+        // Sections near the start and the end are left out, because not all heads have passed them.
         let beyond = |s: &&SectionRow| !s.not_inspected;
         assert!(judged.clone().filter(beyond).count() > 12);
         assert!(judged.filter(beyond).all(|s| s.verdict != Verdict::Open));

@@ -9,7 +9,7 @@ use headrace_tests::scenes;
 use headrace_tests::truth::{self, JudgedDive};
 
 const PARKED_S: u32 = 3600;
-/// Number of rounds back and forth.
+/// Number of times that the vehicle goes back and forth.
 const ROUNDS: usize = 100;
 /// Chainages between which the vehicle goes back and forth, m.
 const FROM_M: f64 = 5.0;

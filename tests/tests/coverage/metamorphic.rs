@@ -225,7 +225,7 @@ fn head_order_does_not_change_results() {
     folder.write("reordered.toml", reordered(&vehicle, 3));
     let (_, got) = folder.replay("dive.mcap", &["--vehicle", "reordered.toml"]);
     assert_eq!(got["sources"][0]["id"], "sonar_2", "the order of heads hasn't changed");
-    // Causes may differ. Start angles, and so phases, are assigned in the order of the heads.
+    // Causes of failed sections may differ, because start angles and phases are assigned in the order of the heads.
     let [got, expected] = [got, expected].map(|mut report| {
         for section in report["sections"].as_array_mut().unwrap() {
             section.as_object_mut().unwrap().remove("cause");
@@ -236,7 +236,7 @@ fn head_order_does_not_change_results() {
     assert_eq!(answers(&got, &keys), answers(&expected, &keys));
 }
 
-/// A message whose channel has another name.
+/// The same message on a channel with another name.
 fn renamed<'a>(message: &Message<'a>, named: &dyn Fn(&str) -> String) -> Message<'a> {
     let metadata = message.channel.metadata.iter().map(|(key, value)| (key.clone(), named(value))).collect();
     let topic = named(&message.channel.topic);

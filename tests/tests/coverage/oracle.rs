@@ -89,7 +89,8 @@ fn holes_are_the_largest_empty_circles() {
                 && [Verdict::Fail, Verdict::Open].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
-        // Packing moves samples by micrometres; the bounds include this movement.
+        // The loop stores samples in packed form, which moves them by micrometres. The reported bounds include this
+        // movement.
         let right =
             section.hole_bounded && (is_within(section, expected_m) || is_of_a_visit(section, expected_m));
         (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
@@ -143,7 +144,7 @@ fn verdicts_follow_from_hole_sigma_and_target() {
             {
                 either
             }
-            // A flag stays until the hole is filled.
+            // A flagged section keeps the verdict "fail" until its hole is filled.
             either @ Verdict::Fail if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
             _ if clear_m > 0.0 => Verdict::Fail,
             _ if behind_m < 0.0 || from_end_m < 0.0 => Verdict::Open,
@@ -319,7 +320,8 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // Without this return, the pings beside its angle have no T_x in the next turn, and T_y spans the gap.
+    // Ping 20 has no return. So the pings beside its angle have no T_x in the next turn, and T_y of the return after it
+    // spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

@@ -81,7 +81,7 @@ fn head_turned_about_its_axis_is_reported_with_angle() {
 #[test]
 fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {
     let right = file("vita2-4.toml");
-    // The first head looks forward, and the other one aft.
+    // The head `sonar_1` looks forward, and `sonar_3` looks aft.
     for (head, what, angles, by_deg) in [
         ("sonar_1", "head_yawed", "[0, 0, 3]", 3.0),
         ("sonar_3", "head_yawed", "[0, 0, 177]", -3.0),

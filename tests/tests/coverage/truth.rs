@@ -62,7 +62,7 @@ fn true_holes_match_a_fine_grid() {
     let strips = Strips::of(&dive.truth);
     let (along, around) = (5_u32, 720_u32);
     let mut judged = 0;
-    // The ends are left out. They are far from all samples, so this search would take long there.
+    // The dive's ends are left out. They are far from all samples, so the grid search would take long there.
     for section in dive.sections.iter().filter(|section| section.true_hole_m < 1.5) {
         let [from_m, to_m] = [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
         let place = |i: u32, j: u32| {
@@ -115,7 +115,7 @@ fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }
 
-/// As [`settled`], with a true hole below `hole_m`.
+/// As [`settled`], but with a limit of `hole_m` for the true hole.
 fn settled_below(section: &truth::JudgedSection, start_m: f64, hole_m: f64) -> bool {
     section.report.start_m > start_m + 1.5 && section.true_hole_m < hole_m
 }

@@ -16,7 +16,7 @@ use headrace_tests::scenes;
 use crate::observed;
 
 const VITA: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
-/// A very slow dive in a pipe of 1 m radius.
+/// Scene of a very slow dive in a pipe of 1 m radius.
 const CREEP: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 6\n\
     speed_mps = 0.03\n[effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.005 }\n";
 const DRIFT: &str = "pilot_drift = { across_m = 0.2, up_m = 0.1, yaw_deg = 6, period_s = 15 }\n";

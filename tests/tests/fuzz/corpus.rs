@@ -76,8 +76,8 @@ pub(crate) struct File {
 
 pub(crate) struct Corpus {
     pub(crate) files: Vec<File>,
-    /// Messages of each intact log. A broken version of a log must contain all of its messages, unless a loss is
-    /// reported.
+    /// Messages of each intact log. A damaged version of a log must contain all messages of the intact log, unless a
+    /// loss is reported.
     pub(crate) said: Vec<Said>,
 }
 
@@ -138,7 +138,7 @@ impl Corpus {
         Self { files, said }
     }
 
-    /// Returns a broken file.
+    /// Returns a randomly damaged version of one of the intact files.
     pub(crate) fn mutant(&self, random: &mut Random) -> (Kind, Vec<u8>) {
         let file = &self.files[random.below(self.files.len())];
         let others: Vec<&File> =
@@ -198,7 +198,7 @@ fn ours(messages: u64) -> Vec<u8> {
     let header = LogHeader { sources: vec![source("depth"), source("imu")], ..LogHeader::default() };
     let mut log = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
     for number in 0..messages {
-        // The log has several chunks of half a second at most.
+        // The generated log has several chunks, each of at most half a second.
         let at = BEGIN + DurNs::from_millis(i64::try_from(number * 40).unwrap());
         log.raw(u16::try_from(number % 2).unwrap(), at, at, &content(number)).unwrap();
     }

@@ -124,7 +124,7 @@ impl Surroundings {
     }
 }
 
-/// Tries a file with arbitrary content.
+/// Gives a file with arbitrary content to its reader.
 ///
 /// Errors: a description of the fault that the reader showed.
 pub(crate) fn try_one(
@@ -184,7 +184,7 @@ fn is_vouched_for(log: &[u8]) -> bool {
     true
 }
 
-/// Number of items that the reader gets from a file.
+/// Number of items (messages, sensors or readings) that the reader gets from an intact file.
 pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     match kind {
         Kind::Log => said(bytes).unwrap().0.len() as u64,
@@ -210,7 +210,8 @@ fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     let mut said = Ok(());
     while !rest.is_empty() {
         let (now, later) = rest.split_at((1 + random.below(24)).min(rest.len()));
-        // The next piece usually follows at once, but sometimes after a silence or with an earlier timestamp.
+        // The next piece of the device's bytes usually follows at once, but sometimes after a silence or with an
+        // earlier timestamp.
         at = match random.below(40) {
             0 => at + DurNs::from_millis(3_600_000),
             1 => MonoNs(at.0.saturating_sub(1_000_000_000)),

@@ -10,7 +10,7 @@ use headrace_tests::{Folder, VEHICLE};
 use crate::bomb_logs::{Bomb, all};
 use crate::run::run;
 
-/// Largest memory for any log, MiB.
+/// Largest memory that a command may use for any log, MiB.
 const MOST_MIB: u64 = 200;
 
 #[test]

@@ -7,7 +7,7 @@ use crate::run::{Ran, run};
 
 const DAY_NS: u64 = 24 * 3600 * 1_000_000_000;
 
-/// Commands that read a log.
+/// Commands of the program that read a dive log.
 const READING: [&[&str]; 7] = [
     &["replay", "odd.mcap"],
     &["replay", "odd.mcap", "--smooth"],

@@ -6,14 +6,14 @@ enum Token<'a> {
     Word(&'a str),
     /// `::`
     Separator,
-    /// Content of a plain string.
+    /// Content of a string literal that isn't raw.
     Text(&'a str),
     Mark(char),
 }
 
 use Token::{Mark, Separator, Text, Word};
 
-/// A module with its own file.
+/// Declaration of a module that has its own file (`mod name;`).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Declared {
     /// Names of the inline modules around the declaration, followed by the name of the module itself.

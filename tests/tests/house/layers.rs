@@ -134,7 +134,7 @@ fn core_has_no_io_and_no_locks() {
     assert!(sources.len() > 20, "{} files", sources.len());
     for (path, text) in sources {
         for (number, line) in text.lines().enumerate() {
-            // Comments may mention these names.
+            // Comments in the core may mention the forbidden names.
             let code = line.split("//").next().unwrap_or_default();
             for barred in BARRED_FROM_CORE.iter().filter(|barred| code.contains(**barred)) {
                 said.push(format!("{}:{}: {barred}", path.display(), number + 1));

@@ -45,7 +45,7 @@ fn import(folder: &Folder, file: &str, map: &str) -> Answer {
     folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "--map", map, "-o", "out.mcap", "--json"])
 }
 
-/// A message: topic, nanoseconds since 1970 (by the log's clock anchor), and bytes.
+/// A message of an imported log: topic, nanoseconds since 1970 (by the log's clock anchor), and bytes.
 type Heard = (String, u64, Vec<u8>);
 
 fn heard(folder: &Folder) -> Vec<Heard> {
@@ -305,7 +305,8 @@ fn damage_of_a_recording_is_reported() {
     let (code, said) = changed(&folder, "none.bag", longer);
     assert!(code == Some(3) && said.contains("the bag states "), "{said}");
     let undefined = |bytes: &mut Vec<u8>| {
-        // Changes the number of the first definition inside a chunk. The definition at the end of the file remains.
+        // Changes the number of the first connection definition inside a chunk. The definition at the end of the file
+        // remains.
         let chunk = find(bytes, b"compression=", 0);
         let at = find(bytes, b"conn=", chunk);
         bytes[at + 5] = 99;
@@ -313,7 +314,7 @@ fn damage_of_a_recording_is_reported() {
     let (code, said) = changed(&folder, "none.bag", undefined);
     assert!(code == Some(3) && said.contains("connection without an earlier definition"), "{said}");
     let twice = |bytes: &mut Vec<u8>| {
-        // Gives the second definition the same number as the first one.
+        // Gives the second connection definition the same number as the first one.
         let chunk = find(bytes, b"op=\x05", 0);
         let first = find(bytes, b"conn=", chunk);
         let second = find(bytes, b"op=\x07", find(bytes, b"op=\x07", first) + 1);

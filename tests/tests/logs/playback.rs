@@ -224,7 +224,7 @@ fn damage(folder: &Folder, log: &str) {
         at += 9 + usize::try_from(len).unwrap();
     }
     for number in [chunks.len() / 2, chunks.len() / 2 + 1, chunks.len() * 3 / 4] {
-        // The byte lies after the chunk's header.
+        // The damaged byte lies after the chunk's header.
         bytes[chunks[number] + 100] ^= 0x55;
     }
     folder.write(log, bytes);

@@ -148,7 +148,7 @@ fn snapshot_with_autopilot_and_velocity_log_resumes_identically() {
     goes_on_from_anywhere(&small_vehicle(|_| headrace_tests::other_vehicle()));
 }
 
-/// A loop refuses the state of another vehicle.
+/// A loop refuses to restore the saved state of another vehicle.
 #[test]
 fn snapshot_of_another_vehicle_is_refused() {
     let two = small_vehicle(str::to_owned);

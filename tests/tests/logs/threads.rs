@@ -32,11 +32,11 @@ const THREADS: [usize; 3] = [1, 2, 3];
 /// End of the test's feed of packets: normal, with an error, or by a panic.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
-    /// After its last packet.
+    /// The feed ends regularly after its last packet.
     Last,
-    /// With an error at this packet.
+    /// The feed ends with an error at this packet.
     Error(usize),
-    /// By a panic at this packet.
+    /// The feed ends by a panic at this packet.
     Panic(usize),
 }
 
@@ -260,7 +260,7 @@ fn loop_waits_for_slow_outlets_and_plugins_see_every_packet() {
     }
 }
 
-/// A split loop refuses to be saved or split again.
+/// A loop that is split among threads refuses to be saved or split again.
 #[test]
 fn split_loop_cannot_be_saved_or_split_again() {
     let scene = scene();

@@ -110,7 +110,8 @@ const LATE_UNIT: &str =
     "line_delay = { sensors = [\"imu\"], latency_ms = 80 }\noutliers = { share = 0.08 }\n";
 const LATE_HEAD: &str = "line_delay = { sensors = [\"front\"], latency_ms = 50 }\n";
 
-/// The errors are a rotated head, a reversed head, a wrong zero of the counter, and a late inertial unit.
+/// The wrong settings are a rotated head, a reversed head, a wrong zero of the cable counter, and the latency of the
+/// inertial unit.
 #[test]
 fn calibrate_finds_wrong_settings_and_proposes_corrections() {
     let front = "position_m = [0.1, 0, 0.04]\nangles_deg = [4, 0, 0]";

@@ -78,7 +78,7 @@ fn hole_errors_of_separately_mounted_heads_are_within_reported_bounds() {
         let scene = scenes::seeded(&text, &told, Some(seed));
         let ours = dive(&scene, filter(&scene), Silence::default());
         let errors = hole_errors(&ours, &tracking::true_dive(&scene));
-        // Sections at the ends have no neighbours on one side.
+        // Sections at the ends of the dive are left out, because they have no neighbours on one side.
         all.extend(errors.iter().skip(12).rev().skip(12).copied());
     }
     holes_within_their_bounds(&all, LEAST_APART);

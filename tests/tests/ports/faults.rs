@@ -196,7 +196,8 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 #[test]
 fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // The headers in the garbage announce a profile of 1200 strengths and a return of 500 points.
+    // The frame headers in the garbage announce an echosounder profile of 1200 strengths and a head's return of 500
+    // points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),
@@ -284,7 +285,7 @@ fn two_answers_to_one_request_are_two_readings() {
     assert_eq!(depth.withheld, 0, "the calibration is whole before the first measurement: {depth:?}");
 }
 
-/// A device that claims to be another one until its fault ends.
+/// A device that claims to be another device until its fault ends.
 struct Disguised(fn(&mut Vec<u8>));
 
 impl Fault for Disguised {

@@ -15,7 +15,7 @@ use headrace_tether_hid::report::REFERENCE_DESCRIPTOR;
 use hidapi::{DeviceInfo, HidApi, HidDevice};
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions, StandardId};
 
-/// Longest wait for expected data.
+/// Longest time that a test waits for expected data.
 const LONG: Duration = Duration::from_secs(10);
 /// Time to wait for data that must not arrive.
 const SHORT: Duration = Duration::from_millis(100);
@@ -32,7 +32,7 @@ fn ip_link(words: &str) {
     assert!(status.success(), "ip link {words}: {status}");
 }
 
-/// A virtual CAN interface for this test. It is removed when it is dropped.
+/// A virtual CAN interface for this test. The interface is removed when this value is dropped.
 struct Interface(&'static str);
 
 impl Interface {
@@ -256,7 +256,7 @@ fn unplugged_counter_is_an_error_and_returns_under_another_device_number() {
     println!("HID: opening an absent device: {missing:?}");
     drop(reader);
 
-    // Before the counter returns, another counter is plugged in and takes its number.
+    // Before the counter is plugged in again, another counter takes its device number.
     let _other = plug(uhid(), "HR-0005");
     let (_other_reader, other_path) = open(&mut api, "HR-0005");
     assert_eq!(other_path, first_path);
@@ -274,7 +274,7 @@ fn last_report_of_an_unplugged_counter_is_lost() {
     let mut device = plug(uhid(), "HR-0006");
     let (reader, _) = open(&mut api, "HR-0006");
     device.report(&report(1)).unwrap();
-    // Closing the device counts as unplugging.
+    // Closing the emulated device counts as unplugging.
     drop(device);
     let error = read(&reader).unwrap_err();
     println!("HID: a report waited, the device went: {error:?}");

@@ -29,11 +29,11 @@ use serde_json::Value;
 const IMU: usize = 0;
 const TETHER: usize = 1;
 
-/// Longest wait for expected data.
+/// Longest time that a test waits for expected data.
 const LONG: DurNs = DurNs::from_millis(20_000);
 /// A line that is silent for this time has no more data.
 const SETTLED: DurNs = DurNs::from_millis(200);
-/// Number of messages sent at once, fewer than the kernel buffers for a counter.
+/// Number of messages sent at once. It is smaller than the number of reports that the kernel buffers for a counter.
 const BURST: usize = 20;
 
 const COUNTER: &str = "hid:1209:0001:HR-0001";
@@ -69,7 +69,7 @@ fn ip_link(words: &str) {
     assert!(status.success(), "ip link {words}: {status}");
 }
 
-/// A virtual CAN interface for this test. It is removed when it is dropped.
+/// A virtual CAN interface for this test. The interface is removed when this value is dropped.
 struct Interface(&'static str);
 
 impl Interface {

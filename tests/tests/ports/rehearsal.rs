@@ -126,7 +126,8 @@ fn sections(report: &Value) -> BTreeMap<String, &Value> {
 
 /// Allowed difference between a hole in the live dive and in the replay of its scene, m.
 const APART_M: f64 = 0.12;
-/// Target of the scene, m. `CONFIDENCE_SD` is its confidence as a number of standard deviations.
+/// Target of the scene, m. `CONFIDENCE_SD` is the number of standard deviations by which a hole must be below the
+/// target to pass.
 const TARGET_M: f64 = 0.7;
 const CONFIDENCE_SD: f64 = 2.0;
 
@@ -201,13 +202,13 @@ fn rehearse(distance_m: f64, keeps_time: bool) {
     assert_eq!(again["sections"], live["sections"]);
 }
 
-/// The vehicle moves for forty seconds.
+/// In this rehearsal, the vehicle moves for forty seconds.
 #[test]
 fn recorded_rehearsal_replays_to_the_displayed_results() {
     rehearse(3.6, false);
 }
 
-/// The vehicle moves for three minutes.
+/// In this rehearsal, the vehicle moves for three minutes.
 #[test]
 #[ignore = "takes three minutes and more; .ci/run does it"]
 fn three_minute_rehearsal_gives_the_sections_of_the_scene_replay() {

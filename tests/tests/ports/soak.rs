@@ -20,7 +20,7 @@ const FREEZE: Duration = Duration::from_millis(1_500);
 /// Number of resource samples at the start that are left out of the checks of open files and threads.
 const WARM_UP: usize = 12;
 
-/// Resources of a process.
+/// Resources that a process uses at a moment.
 #[derive(Debug, Clone, Copy)]
 struct Look {
     resident_kib: f64,
@@ -38,7 +38,7 @@ fn look(pid: u32) -> Option<Look> {
     };
     let stat = std::fs::read_to_string(format!("{proc}/stat")).ok()?;
     let words: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    // User time and system time are the 12th and 13th word after the name.
+    // In `/proc/PID/stat`, user time and system time are the 12th and 13th word after the process name.
     let cpu_ticks = words.get(11)?.parse::<f64>().ok()? + words.get(12)?.parse::<f64>().ok()?;
     let files = std::fs::read_dir(format!("{proc}/fd")).ok()?.count();
     Some(Look { resident_kib: field("VmRSS:")?, files, threads: field("Threads:")?, cpu_ticks })

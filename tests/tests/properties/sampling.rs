@@ -71,7 +71,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("step {last} of {theta:e} at {h}: {tangent} is not the footprint {footprint}"));
     }
 
-    // At the speed for a target, the spacing equals the target, even if T_y is close to the target.
+    // At the speed that is computed for a target, the spacing T equals the target, even if T_y is close to the target.
     let target = case.between(0.1, 3.0);
     let t_y = target * (1.0 - case.power_of_ten(-15.0, 0.0));
     let (gap_s, ping_s) = (case.between(0.1, 30.0), case.between(0.001, 0.1));
@@ -89,7 +89,8 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err("a speed where there is none".to_owned());
     }
 
-    // The advance of a turn is the sum of the advances of its pings, with one step per turn or with thousands.
+    // The vehicle's advance in a turn is the sum of its advances in the turn's pings, with one step per turn or with
+    // thousands.
     let steps = 1 + case.count_below(3000);
     let turn = Turn::new(TAU / f64::from(steps), ping_s).map_err(|why| why.to_string())?;
     let spiral = Spiral::new(speed, turn, 1.0).map_err(|why| why.to_string())?;

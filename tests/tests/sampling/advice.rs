@@ -134,7 +134,7 @@ impl Case {
         alternatives.iter().flatten().find(|other| other.mode.as_str() == self.mode).unwrap().v_max_mps
     }
 
-    /// Advised speed during a dive, and results of dives at this speed and at a tenth more.
+    /// Advised speed during a dive, and results of one dive at this speed and one at a tenth more.
     fn followed(&self) -> Followed {
         let planned_mps = self.planned_mps();
         let v_max_mps = self.dive(planned_mps, planned_mps).median(v_max_mps);
@@ -234,8 +234,8 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
                 ));
             }
         }
-        // In other cases, holes are smaller than predicted, and fewer sections fail. No hole may be larger than
-        // predicted.
+        // In the cases below `NEAR`, holes are smaller than predicted, and fewer sections fail. In no case may a hole
+        // be larger than predicted.
         if at.holes[1].max(above.holes[1]) > 1.0 {
             broken.push(format!("{}: holes of {:?} and {:?} of T", case.what, at.holes, above.holes));
         }
@@ -338,7 +338,7 @@ fn advice_compensates_lost_returns() {
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
-    // Single lost returns have little effect.
+    // Lost returns that are isolated have little effect on the advice.
     let few = Case { effects: "missing_returns = { share = 0.05 }\n", ..VITA1 };
     let [sound_mps, mps] = [VITA1, few].map(|case| case.dive(0.1, 0.1).median(v_max_mps));
     assert!((0.85..0.99).contains(&(mps / sound_mps)), "{mps} of {sound_mps}");

@@ -89,7 +89,7 @@ impl Rig {
     }
 }
 
-/// Least and greatest value.
+/// Smallest and largest of the values.
 fn ends(of: &[f64]) -> [f64; 2] {
     [of.iter().copied().fold(f64::MAX, f64::min), of.iter().copied().fold(f64::MIN, f64::max)]
 }
@@ -99,7 +99,7 @@ fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// Angles of a head at its pings. They are not reduced to one turn.
+/// Angles of a head at its pings, counted on over several turns (not reduced to one turn).
 fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     let mut step_rad = if program.growing { step_rad } else { -step_rad };
     let Some((least, size)) = program.sector else {
@@ -196,7 +196,7 @@ impl Dive {
             let angle = TAU * (k as f64 + share) / heads as f64;
             let mut own = self.tracks[k].passes(angle);
             if [0.0, 1.0].contains(&share) {
-                // At a turning point, two passes coincide.
+                // Where a head turns back, two of its passes coincide.
                 own = own.iter().flat_map(|&m| [m, m]).collect();
             } else {
                 let by = |track: &&Track| !track.passes(angle).is_empty();
@@ -305,7 +305,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_head_at_the_same_chainage() {
                 let off = wrapped(body - along - number as f64 * size);
                 assert!(off.abs() < 1e-8, "{sector:?} {off} off, lead at {angle_rad} {growing}");
                 assert!((0.0..TAU).contains(&got.angle_rad), "{got:?}");
-                // At a turning point, both directions are right.
+                // Where a head turns back, both directions of motion are right.
                 if along > 1e-5 && along < size - 1e-5 {
                     assert_eq!(got.growing, outward != reversed, "{sector:?}, lead {angle_rad} {growing}");
                 }
@@ -349,7 +349,7 @@ proptest! {
         rig.dive(PhaseShift, speed_mps, speed_mps).assert_even(angle, apart_m);
     }
 
-    /// The speed differs from the planned one, so that the gaps differ from each other.
+    /// The speed differs from the planned one, so that the gaps between passes differ from each other.
     #[test]
     fn shifting_or_reversing_all_heads_does_not_change_the_pass_gaps(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]),

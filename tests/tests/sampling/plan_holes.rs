@@ -186,7 +186,7 @@ impl Wall {
         ]
     }
 
-    /// Distance to the nearest sample, m.
+    /// Distance from a point on the wall to the nearest sample, m.
     fn clear_m(&self, [x, sigma]: [f64; 2]) -> f64 {
         let [i, j] = self.cell([x, sigma]);
         let mut best = f64::INFINITY;
@@ -250,7 +250,7 @@ fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();
     let speed_mps = planner.v_max_mps(number, target_m).unwrap();
     let pitch_m = speed_mps * planner.modes()[number].mode.turn.period_s();
-    // The ends are left out, because not all heads have passed there.
+    // The dive's ends are left out, because not all heads have passed there.
     let from_m = pitch_m + 6.0;
     let to_m = from_m + pitch_m;
     let samples = samples(&planner, number, speed_mps, to_m + pitch_m + 6.0, way);

@@ -304,7 +304,7 @@ fn water_temperature_corrects_a_wrong_speed_of_sound() {
     assert!((1447.0..1449.0).contains(&least_mps) && most_mps < 1449.0, "{least_mps} to {most_mps}");
 }
 
-/// Whether this effect alone removes or displaces each ping of a head.
+/// For each ping of a head: whether this effect alone removes or displaces its return.
 fn touched(effect: &str) -> Vec<bool> {
     let ranges = |effects: &str| -> Vec<Option<f64>> {
         let scene = format!("{SCENE}\n[effects]\n{effects}\n");
