@@ -103,7 +103,7 @@ impl Decoder for Nothing {
     }
 }
 
-/// End times of stages, in the order in which they ended.
+/// Names and end times of the loop's stages, in the order in which the stages ended.
 #[derive(Resource, Clone)]
 struct Ends(Arc<Mutex<Vec<(String, Instant)>>>);
 
@@ -128,7 +128,7 @@ impl Outlet for Alerted {
     }
 }
 
-/// Name of the alerter among the stages.
+/// Name under which the alerter is listed among the loop's stages.
 const ALERTER: &str = "Alerter";
 
 /// A loop that records the end of each stage.
@@ -167,7 +167,7 @@ fn app(scene: &Scene, decoding: bool) -> App {
     app
 }
 
-/// A message of the simulation, to be fed to the loop.
+/// A message of a simulated device, to be fed to the loop.
 struct Kept {
     at: MonoNs,
     source: u16,
@@ -261,7 +261,7 @@ fn spans(scene: &Scene) -> (Loop, Vec<(String, Vec<f64>)>) {
     let (_, messages) = messages_of(scene);
     let ends = Ends(Arc::default());
     let mut dive = noting(scene, &ends);
-    // Arming runs a tick, too.
+    // Arming a loop runs a tick, too.
     ends.0.lock().unwrap().clear();
     let mut begins = Vec::new();
     run_noting(&mut dive, &messages, &mut begins);
@@ -345,7 +345,7 @@ fn idle_tick() {
     let mut world = World::new();
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());
-    // A chain with as many systems as the loop has.
+    // A schedule with as many chained systems as the loop has.
     schedule.add_systems((|| nothing(), || nothing(), || nothing(), || nothing(), || nothing()).chain());
     let bare = best(|| {
         let started = Instant::now();
@@ -362,7 +362,7 @@ fn idle_tick() {
     );
 }
 
-/// Samples of ideal heads in time order; all heads are at the circle's centre.
+/// Samples of ideal heads in time order; all heads are at the centre of a circular tunnel.
 fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, usize)> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);

@@ -20,7 +20,7 @@ const ROUNDS: usize = 9;
 
 const SPEED_MPS: f64 = 0.11;
 
-/// Every effect with some parameters; heads turn in sectors, so that `sector_end_slowing` applies.
+/// Every simulator effect with some parameters. Heads sweep sectors, so that `sector_end_slowing` applies.
 const EFFECTS: [(&str, &str); 38] = [
     ("mount_error", "angles_sd_deg = 0.2"),
     ("start_phase_error", "max_deg = 20"),
@@ -79,7 +79,7 @@ fn main() {
     }
 }
 
-/// VITA 2 with four heads over `length_m` metres.
+/// Scene in which VITA 2 with four heads moves over `length_m` metres.
 fn scene(length_m: f64, layout: &str, rest: &str) -> Scene {
     scenes::scene(&text(length_m, layout, rest))
 }
@@ -97,13 +97,13 @@ fn named(effects: &[(&str, &str)]) -> String {
     tables.concat()
 }
 
-/// Time to simulate a scene, s.
+/// CPU time to simulate a scene, s.
 fn simulate(scene: &Scene) -> f64 {
     let mut simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
     timed(|| while simulation.advance() {}).1
 }
 
-/// Minimum time of each piece of work. Each round runs every piece once.
+/// Minimum time that each piece of work takes over all rounds, s. Each round runs every piece once.
 fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
     let mut least = [f64::INFINITY; N];
     for _ in 0..rounds {
@@ -114,7 +114,7 @@ fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) 
     least
 }
 
-/// Cost of each effect, alone and among all the others.
+/// Measures the CPU time of each simulator effect, alone and in addition to all other effects.
 fn cost() {
     const LENGTH_M: f64 = 12.0;
     let returns = 4.0 * 50.0 * LENGTH_M / SPEED_MPS;

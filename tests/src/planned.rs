@@ -1,4 +1,4 @@
-//! Planned speeds of a vehicle.
+//! Planned speed of a vehicle, as `headrace plan` computes it.
 
 use headrace_geometry::math;
 use headrace_sampling::plan::Planner;

@@ -67,7 +67,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Number of allocator calls on this thread while `work` runs.
+/// Number of allocator calls that this thread makes while `work` runs.
 fn allocations(work: impl FnOnce()) -> u64 {
     COUNTED.with(|counted| counted.set(Some(0)));
     work();

@@ -9,9 +9,10 @@ use headrace_tests::world::invariants::broken;
 use headrace_tests::world::plan::Plan;
 use headrace_tests::world::{DiveResult, Sabotage, World};
 
-/// Default seeds. The environment can set others: `HEADRACE_WORLD_SEEDS=1000..2000`.
+/// Default seeds of the simulated worlds. An environment variable can set others: `HEADRACE_WORLD_SEEDS=1000..2000`.
 const SEEDS: std::ops::Range<u64> = 0..300;
-/// Number of worlds tried. Each sabotage must be detected in at least one of them.
+/// Number of simulated worlds tried with each sabotage (a deliberate fault of the program). At least one of them must
+/// detect the sabotage.
 const ENOUGH: u64 = 100;
 
 fn seeds() -> std::ops::Range<u64> {

@@ -13,7 +13,7 @@ const TINY_M: f64 = 1e-100;
 /// Largest rounding error of a circumradius or a circumcentre, m.
 const ROUNDING_M: f64 = 1e-6;
 
-/// A place: chainage and arc length, m.
+/// A place on the unrolled wall: chainage and arc length, m.
 pub type Place = [f64; 2];
 
 #[derive(Clone, Copy)]
@@ -27,12 +27,12 @@ impl HasPosition for Vertex {
     }
 }
 
-/// A circle without samples.
+/// A circle on the unrolled wall that contains no samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circle {
-    /// Centre: chainage and arc length, m.
+    /// Centre of the circle: chainage and arc length, m.
     pub centre: Place,
-    /// Radius, m.
+    /// Radius of the circle, m.
     pub radius_m: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Figures of a cell: verdicts and standard deviations compared with the truth.
+//! Figures of a cell of the field table: verdicts and standard deviations compared with the truth.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
@@ -9,7 +9,7 @@ use headrace_simulator::Scene;
 use crate::field::rms;
 use crate::truth::{JudgedDive, JudgedSection};
 
-/// Kinds of sources with innovations, by name.
+/// Kinds of sensors whose readings have innovations in the filter, each with its name in the table.
 pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
     ("head", Sense::Head),
     ("ping", Sense::Echosounder),
@@ -29,7 +29,7 @@ const TOUCH_M: f64 = 0.02;
 /// A section that passed although its true hole exceeds the target.
 #[derive(Debug, Clone)]
 pub struct FalsePass {
-    /// Seed of the dive.
+    /// Seed of the dive in which the section passed.
     pub seed: u64,
     /// Chainage of the section's start, m.
     pub start_m: f64,
@@ -37,14 +37,14 @@ pub struct FalsePass {
     pub hole_m: [f64; 3],
     /// Reported position of the hole: chainage and clock position.
     pub at: (f64, String),
-    /// Number of returns that weren't accepted as wall.
+    /// Number of the section's returns that weren't accepted as wall.
     pub doubtful: u32,
 }
 
-/// Figures of all dives of a cell.
+/// Figures over all dives of a cell.
 #[derive(Debug, Clone, Default)]
 pub struct Figures {
-    /// Number of dives.
+    /// Number of dives of the cell.
     pub dives: u32,
     /// Number of sections, including sections at the ends of dives.
     pub sections: u32,
@@ -54,7 +54,7 @@ pub struct Figures {
     pub passed_over: u32,
     /// Number of passed sections with D_true over 1.1 times the target.
     pub passed_far: u32,
-    /// All passed sections with D_true over the target.
+    /// List of the passed sections with D_true over the target.
     pub falsely: Vec<FalsePass>,
     /// Number of sections with D_true below 0.9 times the target.
     pub under: u32,
@@ -69,7 +69,7 @@ pub struct Figures {
     /// D minus D_true, and the standard deviation of D, m. Contains each inner section with a bounded hole of its
     /// own.
     pub errors: Vec<[f64; 2]>,
-    /// Number of used measurements, and sum of their normalised innovations squared, by kind of source.
+    /// Number of measurements that the filter used, and sum of their normalised innovations squared, by kind of sensor.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
     /// Advised speeds, without those near the ends of dives, m/s.
     pub advised_mps: Vec<f64>,
@@ -78,7 +78,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Adds the part of a dive beyond the chainage `from_m`.
+    /// Adds the figures of a dive, from the chainage `from_m` on.
     pub fn add(&mut self, dive: &JudgedDive, scene: &Scene, from_m: f64) {
         self.dives += 1;
         let target_m = dive.report.target_m;
@@ -102,7 +102,7 @@ impl Figures {
         self.tell(dive);
     }
 
-    /// Adds the figures of other dives.
+    /// Adds the figures of other dives of the same cell.
     pub fn join(&mut self, other: &Self) {
         self.dives += other.dives;
         self.sections += other.sections;
@@ -207,17 +207,17 @@ impl Figures {
         self.way_m[1] += told as f64 * section_m;
     }
 
-    /// Fraction of the inner length with this verdict, by number: passed, failed, can't say, open.
+    /// Fraction of the inner length with a verdict, given by number: 0 passed, 1 failed, 2 can't say, 3 open.
     pub fn share(&self, verdict: usize) -> f64 {
         self.verdicts_m[verdict] / self.inner_m
     }
 
-    /// Fraction of the inner length with D_true within the target.
+    /// Fraction of the inner length with D_true within the target, 0 to 1.
     pub fn passable(&self) -> f64 {
         self.passable_m / self.inner_m
     }
 
-    /// Root mean square of the errors, each divided by its standard deviation.
+    /// Root mean square of the errors of D, each divided by its standard deviation.
     pub fn ratio_rms(&self) -> f64 {
         if self.errors.is_empty() {
             f64::NAN
@@ -226,18 +226,18 @@ impl Figures {
         }
     }
 
-    /// Fraction of errors within this many standard deviations.
+    /// Fraction of the errors of D that are within this many standard deviations.
     pub fn within(&self, sigmas: f64) -> f64 {
         let within = self.errors.iter().filter(|[error_m, sd_m]| error_m.abs() <= sigmas * sd_m).count();
         within as f64 / self.errors.len() as f64
     }
 
-    /// Root mean square of the errors, m.
+    /// Root mean square of the errors of D, m.
     pub fn error_m(&self) -> f64 {
         rms(self.errors.iter().map(|[error_m, _]| *error_m))
     }
 
-    /// Median of the standard deviations, m.
+    /// Median of the reported standard deviations of D, m.
     pub fn sd_m(&self) -> f64 {
         median(self.errors.iter().map(|[_, sd_m]| *sd_m))
     }
@@ -247,7 +247,7 @@ impl Figures {
         median(self.advised_mps.iter().copied())
     }
 
-    /// Mean normalised innovation squared of one kind of source, by number.
+    /// Mean normalised innovation squared of one kind of sensor, given by its index in [`KINDS_OF_SOURCES`].
     pub fn nis(&self, kind: usize) -> Option<f64> {
         let (used, sum) = self.innovations[kind];
         (used > 0.0).then(|| sum / used)

@@ -20,15 +20,15 @@ pub use knowing::UpperBound;
 pub use matrix::Matrix;
 pub use remedy::remedies;
 
-/// Sections this near to the ends of the trajectory are left out, m, because they always fail.
+/// Sections within this distance of the ends of the trajectory are ignored, m, because they always fail.
 const END_M: f64 = 2.0;
-/// Failed sections this near to each other form one stretch, m.
+/// Failed sections within this distance of each other form one stretch, m.
 const JOIN_M: f64 = 0.5;
 
 /// A hole up to this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
-/// Alternative sets of causes, each one sorted. Any of these sets is right.
+/// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of them.
 pub type Right = Vec<Vec<Cause>>;
 
 /// A failed section with true and displayed causes.
@@ -36,23 +36,23 @@ pub type Right = Vec<Vec<Cause>>;
 pub struct Judged {
     /// Chainage of the section's start and end, m.
     pub ends_m: [f64; 2],
-    /// Sets of causes that are right.
+    /// Sets of causes that count as right.
     pub right: Right,
     /// Displayed causes, sorted.
     pub told: Vec<Cause>,
-    /// Number of the section's run.
+    /// Number of the run of sections to which the section belongs.
     pub run: Option<u32>,
-    /// Diameter of the hole, m.
+    /// Diameter of the section's hole, m.
     pub hole_m: f64,
     /// Diameter of the hole with one injected cause removed, one value per cause, m; infinite if the hole can't
     /// be measured.
     pub without_m: Vec<f64>,
-    /// Evidence for the displayed causes.
+    /// Evidence that the program reports for the displayed causes.
     pub evidence: Evidence,
 }
 
 impl Judged {
-    /// Whether the displayed causes are right.
+    /// Whether the displayed causes equal one of the right sets.
     pub fn is_right(&self) -> bool {
         self.right.contains(&self.told)
     }
@@ -65,11 +65,11 @@ impl Judged {
     }
 }
 
-/// A dive with its failed sections.
+/// A drawn dive with its failed sections, and the true and displayed causes of these sections.
 pub struct InterventionDive {
-    /// The drawn dive, with its final target.
+    /// The dive as drawn from its seed, with its final target.
     pub drawn: Drawn,
-    /// Report with all injected causes.
+    /// Report of the dive with all injected causes.
     pub report: Report,
     /// Failed sections that the injected causes can explain.
     pub sections: Vec<Judged>,
@@ -94,7 +94,7 @@ impl Stretch<'_> {
             .unwrap_or(&[])
     }
 
-    /// Number of runs in which the stretch is displayed.
+    /// Number of displayed runs over which the stretch is spread.
     pub fn runs(&self) -> usize {
         let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
         runs.sort_unstable();
@@ -166,12 +166,12 @@ fn hole_at_m(report: &Report, start_m: f64) -> f64 {
     same.and_then(|same| same.hole_m).unwrap_or(f64::INFINITY)
 }
 
-/// Displayed causes of a section, sorted.
+/// Displayed causes in a section's evidence, sorted.
 fn told(evidence: &Evidence) -> Vec<Cause> {
     evidence.causes.iter().collect()
 }
 
-/// Right sets of causes; `None` if the section fails even without all injected causes.
+/// Sets of causes that count as right for a section; `None` if the section fails even without all injected causes.
 fn right(drawn: &Drawn, alone: &[bool], together: bool) -> Option<Right> {
     if !together {
         return None;
@@ -218,7 +218,7 @@ pub fn kinds(seed: u64) -> Vec<usize> {
     if number.is_multiple_of(2) {
         return vec![number / 2 % KINDS.len()];
     }
-    // All pairs of causes take turns.
+    // Dives with two causes take all pairs of causes in turn.
     let pairs: Vec<[usize; 2]> =
         (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
     pairs[number / 2 * 17 % pairs.len()].to_vec()

@@ -45,11 +45,11 @@ use disk::{LeftFile, SimulatedDisk};
 use plan::{BEGIN, Ending, MachineFault, Plan};
 pub use sabotage::Sabotage;
 
-/// Longest step of the world, ns.
+/// Longest time step of the simulated world, ns.
 const LONGEST_STEP_NS: usize = 12_000_000;
-/// Longest wait for data under way at the end of a dive.
+/// Longest wait at the end of a dive for data that is on its way to the loop.
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
-/// Capacity of the queue to the terminal. It is small, so that the queue becomes full soon.
+/// Capacity of the queue of notices to the terminal. It is small, so that the queue becomes full soon.
 const NOTICES: usize = 4;
 /// Age beyond which recorded packets are always synced: half a second plus one step of the world.
 const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
@@ -69,7 +69,7 @@ surface_above_floor_m = 8
 planned_speed_mps = 0.2
 "#;
 
-/// Tables of the sensors in the vehicle file.
+/// Tables of the sensors in the vehicle file, without their ids.
 const SENSORS: [&str; 6] = [
     "plugin = \"imagenex881\"\nconnect = \"tcp:10.0.0.1:4040\"\nmode = \"fastest\"\nrange_m = 5\n",
     "plugin = \"imagenex881\"\nconnect = \"serial:/dev/ttyS1\"\nmode = \"fastest\"\nrange_m = 5\n",
@@ -82,7 +82,7 @@ const SENSORS: [&str; 6] = [
 /// Size of the recorder's queue, bytes. It is so small that a stall of some seconds fills the queue.
 const QUEUE_BYTES: usize = 128 * 1024;
 
-/// The vehicle file of all worlds.
+/// The vehicle file of all simulated worlds.
 pub fn vehicle_text() -> String {
     let mut text = TUNNEL.to_owned();
     for (number, sensor) in SENSORS.iter().enumerate() {
@@ -96,13 +96,13 @@ pub fn vehicle_text() -> String {
 pub struct Consumed {
     /// Source of the packet.
     pub source: u16,
-    /// Receive time.
+    /// Receive time of the packet.
     pub received: MonoNs,
-    /// Content.
+    /// Content of the packet.
     pub bytes: Vec<u8>,
 }
 
-/// A dive in a world.
+/// A dive in a simulated world.
 pub struct World {
     sabotage: Option<Sabotage>,
     random: Random,
@@ -121,7 +121,8 @@ pub struct World {
     is_failing: bool,
     /// Number of packets that the recorder skipped because its backlog was too large.
     skipped: usize,
-    /// Time since which packets have waited for the loop. `longest_wait` is the longest such wait of a running loop.
+    /// Time since which packets have waited to be taken by the loop. `longest_wait` is the longest such wait while the
+    /// loop was running.
     waiting_since: Option<MonoNs>,
     longest_wait: DurNs,
     notices: NoticeReceiver,
@@ -129,25 +130,25 @@ pub struct World {
     certain: usize,
 }
 
-/// Result of a dive.
+/// Result of a dive in a simulated world.
 pub struct DiveResult {
-    /// Planned faults.
+    /// Faults planned for the dive.
     pub plan: Plan,
-    /// Packets that the loop took, in order.
+    /// Packets that the loop took during the dive, in order.
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// Results of the lines, one for each device.
+    /// Results of the lines between devices and loop, one for each device.
     pub lines: Vec<Line>,
     /// Summary of the recorder; `None` if it was killed.
     pub summary: Option<Summary>,
     /// Number of failed disk operations.
     pub disk_failures: usize,
-    /// Files of the recording.
+    /// Files of the recording that are left on the disk.
     pub left: Vec<LeftFile>,
     /// Number of consumed packets that must be in the log, whichever way the dive ends.
     pub certain: usize,
-    /// Longest time for which packets waited although the loop ran.
+    /// Longest time for which packets waited to be taken although the loop ran.
     pub longest_wait: DurNs,
 }
 
@@ -157,11 +158,11 @@ pub struct Replayed {
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// Losses that the player reported.
+    /// Losses that the replay reported.
     pub losses: Vec<String>,
 }
 
-/// Result of a device's line.
+/// Result of the line of one device.
 #[derive(Debug)]
 pub struct Line {
     /// Whether the plan has no fault for the device.
@@ -172,7 +173,7 @@ pub struct Line {
     pub whole: u64,
     /// Number of good frames that the loop found.
     pub good: u64,
-    /// History of the line.
+    /// Counts of openings, losses and dropped packets of the line, and its last status.
     pub history: LineHistory,
 }
 
@@ -182,7 +183,7 @@ impl World {
         Self::sabotaged(seed, None)
     }
 
-    /// As [`World::new`]; the sabotage breaks an invariant.
+    /// As [`World::new`], but with a sabotage that breaks an invariant.
     pub fn sabotaged(seed: u64, sabotage: Option<Sabotage>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
@@ -254,7 +255,7 @@ impl World {
         self
     }
 
-    /// Runs the dive.
+    /// Runs the dive to its planned end and returns the result.
     pub fn live(mut self) -> DiveResult {
         while self.clock.now() < self.plan.end {
             self.step(false);
@@ -445,9 +446,10 @@ fn assemble(
     (app.arm(vehicle.navigation()).unwrap(), worker, notices)
 }
 
-/// Does the work of a line service's thread up to the point where the thread would wait.
+/// Does the work of a line service's thread until the thread would wait.
 fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
-    // Each step reads once. The limit detects a driver that is always due; a real thread would never wait.
+    // The driver reads once in each round. The limit detects a driver that is due again at once in every round; a real
+    // thread would never wait.
     for _ in 0..10_000 {
         let due = match service.closed_until() {
             Some(until) => until <= now,

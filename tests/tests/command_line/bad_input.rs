@@ -464,7 +464,8 @@ fn every_command_has_help_with_an_example() {
     assert!(commands.contains(&"replay") && commands.contains(&"demo"), "{commands:?}");
     for command in commands.into_iter().filter(|command| *command != "help") {
         let answer = folder.headrace(&[command, "--help"]);
-        // These commands run another program. If that program is missing, the message says how to build it.
+        // The commands `campaign`, `batch` and `cost` run another program. If that program is missing, the message says
+        // how to build it.
         if ["campaign", "batch", "cost"].contains(&command) && answer.code == Some(2) {
             assert!(
                 answer.stderr.contains("cargo build --release --manifest-path lab/Cargo.toml -p headrace_c"),

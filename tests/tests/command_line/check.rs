@@ -92,7 +92,7 @@ fn findings(cases: &[(&str, &[(&str, &str)])]) -> String {
     for (what, changes) in cases {
         folder.write("vehicle.toml", changed(VEHICLE, changes));
         let answer = folder.headrace(&["check", "vehicle.toml"]);
-        // Errors suppress the summary; warnings don't.
+        // If `check` finds errors, it prints no summary; warnings don't suppress the summary.
         assert_eq!(answer.stdout.is_empty(), answer.code == Some(2), "{what}");
         write!(said, "{what}: {}\n{}", answer.code.unwrap(), answer.stderr).unwrap();
     }
@@ -281,7 +281,7 @@ fn json_has_every_error_with_its_line() {
     assert_eq!(errors[1]["line"], line("id = \"imu\""));
 }
 
-/// A circle of 3 m radius with this number of points.
+/// CSV text of a surveyed profile: a circle of 3 m radius with this number of points.
 fn surveyed(points: u32) -> String {
     let mut text = "y_m,z_m\n".to_owned();
     for k in 0..points {
@@ -340,8 +340,8 @@ fn too_many_sensors_give_the_same_error_in_check_and_run() {
     assert!(answer.stderr.contains("many.toml:284: sensors[64].id: 65 sensors"), "{}", answer.stderr);
 }
 
-/// The phases of the heads are set at the start, for the planned speed in the vehicle file. The limit applies to these
-/// phases. `run` gives the same advice.
+/// The heads' phases are set at the start of the dive, for the planned speed in the vehicle file. The speed limit from
+/// `check` applies to these phases. `run` gives the same limit.
 #[test]
 fn check_gives_the_speed_limit_for_head_phases_of_the_planned_speed() {
     let folder = Folder::new();

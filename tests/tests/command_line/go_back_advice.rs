@@ -4,7 +4,7 @@
 use headrace_tests::{Folder, root};
 use serde_json::Value;
 
-/// Output lines of a dive of the shipped vehicle along this scene's path.
+/// Output lines (JSON) of a dive in which the shipped vehicle follows this scene's path.
 fn told(scene: &str) -> Vec<Value> {
     let folder = Folder::new();
     let file = root().join("deploy/vehicles/vita2-4.toml");
@@ -25,7 +25,8 @@ fn figure(line: &Value, key: &str) -> f64 {
     line[key].as_f64().unwrap_or_else(|| panic!("{key} of {line}"))
 }
 
-/// Displayed conditions between two chainages in one direction, without the seconds after the vehicle turns.
+/// Displayed conditions (such as "too_fast") between two chainages while the vehicle moves in one direction. The
+/// seconds after a reversal are left out.
 fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
     let states = of(lines, "state");
     let within = |state: &&&Value| {
@@ -59,7 +60,7 @@ fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
     assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
 }
 
-/// A dive with this speed on the way out and a high speed on the way back.
+/// A scene in which the vehicle drives out at this speed and goes back at a high speed.
 fn there_and_back(there_mps: f64) -> Vec<Value> {
     told(&format!(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
@@ -69,7 +70,7 @@ fn there_and_back(there_mps: f64) -> Vec<Value> {
 }
 
 #[test]
-fn too_fast_is_not_raised_over_wall_with_a_pass_or_while_reversing() {
+fn too_fast_is_not_raised_over_passed_wall_or_while_reversing() {
     let lines = there_and_back(0.09);
     let conditions_there = conditions(&lines, false, [7.0, 13.0]);
     assert!(conditions_there.iter().all(|condition| *condition != "passed"), "{conditions_there:?}");
@@ -80,9 +81,10 @@ fn too_fast_is_not_raised_over_wall_with_a_pass_or_while_reversing() {
     assert!(back.len() > 5 && back.iter().all(|condition| *condition == "going_back"), "{back:?}");
 }
 
-/// The limit returns early enough for the pilot to slow down before new wall.
+/// When the vehicle goes forward again, the speed limit is displayed early enough for the pilot to slow down before the
+/// heads reach unsampled wall.
 #[test]
-fn speed_limit_returns_before_the_heads_reach_new_wall() {
+fn speed_limit_is_displayed_again_before_the_heads_reach_unsampled_wall() {
     let lines = told(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
          [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 12\nspeed_mps = 0.09\n\
@@ -133,7 +135,7 @@ fn following_the_go_back_advice_clears_every_missed_section() {
     assert!(left_m < 0.1, "{left_m} m, {text}");
 }
 
-/// The totals include missed sections even if the dive ends on the way back.
+/// The report's totals include missed sections even if the dive ends on the way back.
 #[test]
 fn dive_that_ends_on_the_way_back_reports_its_missed_sections() {
     let lines = told(&missed_and_back(10.5, None));

@@ -299,7 +299,8 @@ fn written_plan_lines_configure_the_best_mode() {
     assert!((0.0..0.001).contains(&(0.95 * v_max_mps - speed_mps)), "{speed_mps} of {v_max_mps}");
     assert_eq!(line("mode"), format!("mode = {}", best["mode"]));
     assert_eq!(written.stdout.matches("[[sensors]]").count(), 4);
-    // A vehicle file with these lines in place of its own passes the check, and gets the same v_max.
+    // If the lines from `plan --write` replace the same keys of the vehicle file, `check` accepts the file and computes
+    // the same v_max.
     let old = std::fs::read_to_string(VITA_2).unwrap();
     let pasted: Vec<String> = old
         .lines()

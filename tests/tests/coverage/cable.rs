@@ -23,13 +23,13 @@ const DOUBTED_WITHIN_S: f64 = 2.0;
 /// and after the moment when the counter is first doubted. The reported standard deviation of its hole is too small.
 const KNOWN_FAR: usize = 1;
 
-/// A dive during which the counter is stuck.
+/// A simulated dive during which the cable counter is stuck.
 struct Stuck {
     scene: Scene,
     from_s: f64,
 }
 
-/// Draws a random dive. The expected holes vary from well below the target to well above it.
+/// Draws a random dive with a stuck cable counter. The expected holes vary from well below the target to well above it.
 fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     let mut draw = Draw::new(seed);
     let [least_mps, most_mps] = speeds_mps;
@@ -58,7 +58,8 @@ fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     Stuck { scene: scenes::seeded(&text, &load, Some(seed)), from_s }
 }
 
-/// Time of an update at which the counter is doubted because it differs from the inertial unit.
+/// Time of a filter update that doubts the cable counter because the counter contradicts the inertial unit; otherwise
+/// `None`.
 fn doubted_at(item: &PlacedItem) -> Option<MonoNs> {
     let Placement::Update(update) = &item.placement else { return None };
     update.doubts.cable.filter(|doubt| doubt.log.is_none()).map(|_| update.at)

@@ -4,7 +4,7 @@ use headrace_coverage::Verdict;
 use headrace_simulator::Scene;
 use headrace_tests::{scenes, truth};
 
-/// Number of dives of each kind.
+/// Number of simulated dives of each kind.
 const DIVES: u64 = 8;
 /// Largest allowed error of the displayed speed, m/s. The tests guard against a fault that displayed 0.98 m/s for a
 /// vehicle at 0.2 m/s.
@@ -15,8 +15,8 @@ type Legs = &'static [(f64, f64, f64)];
 const STEADY: Legs = &[(14.0, 0.2, 0.0)];
 const STOP_AND_GO: Legs = &[(3.0, 0.3, 6.0), (2.0, 0.2, 11.0), (4.0, 0.31, 4.0), (3.0, 0.25, 0.0)];
 const WANDERING: &str = "tether_slack = { reach_m = 0.06, period_s = 30 }\n";
-/// Three simultaneous swings with a total reach of 10 cm; the period of one equals the turn time of a head. The
-/// attitude of the inertial unit wanders at the same rate as the cable.
+/// Three simultaneous swings of the cable with a total reach of 10 cm. The period of one swing equals the turn time of
+/// a head. The attitude of the inertial unit wanders at the same rate as the cable.
 const SWINGING: &str = "tether_slack = { swings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.021, period_s = 10 }, \
     { reach_m = 0.055, period_s = 20 }] }\n";
 
@@ -39,7 +39,7 @@ fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
     scenes::seeded(&text, &|name: &str| scenes::vehicle_file(name), Some(seed))
 }
 
-/// Wrong results of a dive.
+/// Wrong results of a dive: errors of displayed speed and of verdicts.
 #[derive(Debug, Default)]
 struct Wrong {
     /// Largest error of the displayed speed while there is a fix, m/s.

@@ -17,7 +17,7 @@ const HEAD_M: f64 = 0.551;
 const START_M: f64 = 3.0;
 const SPEED_MPS: f64 = 0.11;
 
-/// A steady dive at the planned speed with these effects.
+/// Report of a dive at the constant planned speed with these simulator effects.
 fn steady(distance_m: f64, effects: &str) -> Report {
     let scene = format!(
         "seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n[[trajectory.legs]]\n\
@@ -114,7 +114,7 @@ fn stretch_crossed_while_all_heads_are_silent_fails() {
     }
 }
 
-/// A dive along these legs (m) without position errors.
+/// Report of a dive without position errors; the signed lengths of its legs are given in m.
 fn legs(distances_m: &[f64]) -> Report {
     let vehicle = VEHICLE.replace("slack_sd_m = 0.02", "way = \"direct\"\n#");
     let mut scene = format!("seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n");
@@ -188,13 +188,13 @@ fn flags_wait_only_for_live_heads() {
         let late_s = late_s(&report, section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
-    // One of four heads is silent; the speed suits three heads.
+    // One of the four heads is silent; the vehicle is slow enough for the other three heads.
     let silent = silence("\"sonar_1\"", "from_s = 10");
     let (one, none) = (steady(6.0, &silent), steady(6.0, ""));
     accounted_for("one of four", &one);
     for report in [&one, &none] {
         let judged = report.sections.iter().filter(|s| s.end_m <= 7.5);
-        // Near the start and the end, not all heads have passed.
+        // Sections near the start and the end are left out, because not all heads have passed them.
         let beyond = |s: &&SectionRow| !s.not_inspected;
         assert!(judged.clone().filter(beyond).count() > 12);
         assert!(judged.filter(beyond).all(|s| s.verdict != Verdict::Open));

@@ -14,7 +14,8 @@ const LENGTH_M: f64 = 7.0;
 /// Largest allowed share of passes among the sections with D_true over T.
 const MOST_OVER: f64 = 0.025;
 
-/// A random cell, near the portal or far from it. The expected holes vary from well below the target to well above it.
+/// A random cell of the field table (vehicle, condition, place and speed), near the portal or far from it. The expected
+/// holes vary from well below the target to well above it.
 fn cell(seed: u64) -> Cell {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let mut draw = Draw::new(seed);

@@ -111,7 +111,7 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
     };
     let passed = all(Verdict::Pass);
     assert!(passed.over > 5 && passed.passed_over == passed.over, "{passed:?}");
-    // These figures include the dive's ends, where a section has a neighbour on one side only.
+    // The counts in `passed` and `failed` include the dive's ends, where a section has a neighbour on one side only.
     assert!((1..=passed.over).contains(&passed.passed_far), "{passed:?}");
     assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
     let failed = all(Verdict::Fail);

@@ -53,7 +53,8 @@ fn every_flag(
     assert!(said.is_empty(), "{} of {raised} flags: {:#?}", said.len(), &said[..said.len().min(8)]);
 }
 
-/// Longest additional delay, s. A flag waits until the heads are past the section's end or the vehicle is stationary.
+/// A flag that becomes due less than this time before the end of the dive need not be raised, s. The loop waits until
+/// the heads have passed the section's end or the vehicle is stationary.
 const SOON_S: f64 = 3.0;
 
 /// Whether a flag was raised before its due moment, or raised although none was due.
@@ -185,7 +186,8 @@ fn end_of_a_dive_raises_no_flag() {
 
 #[test]
 fn no_flag_is_raised_while_the_fail_can_still_be_undone() {
-    // Dives with a filter are left out, because their standard deviations still change after a flag is raised.
+    // Dives with a navigation filter are left out, because their standard deviations still change after a flag is
+    // raised.
     every_flag(
         |judged| forward(judged) && direct(judged),
         |judged, _, due| is_early(judged, due).then_some("raised though going on could have undone it"),
@@ -197,7 +199,7 @@ fn flag_of_a_stationary_or_returning_vehicle_is_raised_within_one_turn() {
     every_flag(
         |judged| direct(judged) && matches!(judged.seeded.kind, Kind::Parked | Kind::Reversing),
         |judged, _, due| {
-            // If the vehicle turns back at the due moment, it may still undo the fail.
+            // If the vehicle turns back at the moment when the flag is due, a later pass may still undo the fail.
             let due_s = due.due_s.filter(|due_s| {
                 let back_s = judged.journey.turned_back_s();
                 !(back_s - 3.0..judged.journey.turned_on_s()).contains(due_s)

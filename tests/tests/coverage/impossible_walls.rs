@@ -18,7 +18,7 @@ fn metres(report: &Value, verdict: &str) -> f64 {
     report["summary"][format!("{verdict}_m")].as_f64().unwrap()
 }
 
-/// Alerts that report observations about the dive as a whole.
+/// Alerts about observations, such as an impossible wall, that the report lists with their number of occurrences.
 fn observed(report: &Value) -> Vec<&Value> {
     let alerts = report["alert_list"].as_array().unwrap().iter();
     alerts.filter(|alert| !alert["occurrences"].is_null()).collect()
@@ -114,6 +114,6 @@ fn wrong_speed_of_sound_shifts_the_wall() {
     let (_, as_told) = folder.replay("dive.mcap", &[]);
     let (_, faster) = folder.replay("dive.mcap", &["--sound-speed", "1500"]);
     assert!(mean(&as_told).abs() < 0.02, "{}", mean(&as_told));
-    // The expected shift is 3.7 % of 3 m.
+    // The wall is expected to shift by 3.7 % of the 3 m radius.
     assert!((0.06..0.15).contains(&mean(&faster)), "{}", mean(&faster));
 }

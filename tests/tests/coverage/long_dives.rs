@@ -9,14 +9,15 @@ use headrace_tests::scenes;
 use headrace_tests::truth::{self, JudgedDive};
 
 const PARKED_S: u32 = 3600;
-/// Number of rounds back and forth.
+/// Number of times that the vehicle goes back and forth.
 const ROUNDS: usize = 100;
 /// Chainages between which the vehicle goes back and forth, m.
 const FROM_M: f64 = 5.0;
 const TO_M: f64 = 9.0;
 /// Chainage of the end of the dive, m.
 const END_M: f64 = 16.0;
-/// Largest difference between the bounds of a hole if samples in full cells are thinned out, m.
+/// Largest difference between the lower and upper bound of a hole's diameter if the loop thins out samples in full
+/// cells, m.
 const THINNED_M: f64 = 0.04;
 
 fn scene(parked_s: u32, rounds: usize) -> String {
@@ -33,7 +34,7 @@ fn scene(parked_s: u32, rounds: usize) -> String {
     text + &format!("[[trajectory.waypoints]]\nchainage_m = {END_M}\nspeed_mps = 0.1\n")
 }
 
-/// Simulates a dive. Returns the dive and the memory for samples at every minute, bytes.
+/// Simulates a dive. Returns the dive, and the memory used by samples at the end of each minute, bytes.
 fn dive(parked_s: u32, rounds: usize) -> (JudgedDive, Vec<usize>) {
     let scene = scenes::scene(&scene(parked_s, rounds));
     let (mut used, mut ticks) = (Vec::new(), 0_u64);
@@ -47,7 +48,7 @@ fn dive(parked_s: u32, rounds: usize) -> (JudgedDive, Vec<usize>) {
 }
 
 #[test]
-fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
+fn hour_of_parking_and_hundred_trips_back_and_forth_change_no_verdict() {
     let (once, _) = dive(0, 1);
     let (long, used) = dive(PARKED_S, ROUNDS);
     assert_eq!(once.sections.len(), long.sections.len());
@@ -61,7 +62,8 @@ fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
             panic!("section {}: no bounds", b.report.start_m)
         };
         assert!(most_m - least_m <= THINNED_M, "section {}: {least_m} to {most_m}", b.report.start_m);
-        // Sections beyond the long phase have holes as close to the truth as without that phase.
+        // Sections beyond the parking place and the rounds have holes as close to the truth as in a dive without
+        // parking and rounds.
         if a.report.start_m >= TO_M + 1.0 {
             for (off_m, section) in off_m.iter_mut().zip([a, b]) {
                 *off_m = off_m.max((section.report.hole_m.unwrap() - section.true_hole_m).abs());

@@ -88,7 +88,7 @@ impl Beside<'_> {
     }
 }
 
-/// A vehicle without a filter, with heads at these places in the body frame.
+/// Vehicle file without a navigation filter, with heads at these positions in the body frame.
 ///
 /// If `side` is -1, the places, the turning direction of the heads, and the directions of the echosounders are
 /// mirrored.
@@ -117,7 +117,7 @@ fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     text
 }
 
-/// The dive is slow enough at first, then too fast, and returns over a part of its path.
+/// The vehicle is slow enough at first, then too fast, and then goes back over a part of its path.
 fn legs(start_m: f64, place_m: [f64; 2]) -> String {
     let mut text = format!(
         "vehicle = \"vehicle.toml\"\n[effects]\nmotion_within_turn = {{}}\n[trajectory]\nstart_m = {start_m}\nplace_m = {place_m:?}\n"
@@ -208,7 +208,7 @@ fn reordered(vehicle: &str, heads: usize) -> String {
     tables.join("[[sensors]]\n")
 }
 
-/// Results in the report under these keys.
+/// Values of these keys in the report.
 fn answers<'a>(report: &'a Value, keys: &[&str]) -> Vec<&'a Value> {
     assert!(report["summary"]["flags_raised"].as_u64().unwrap() > 5, "{}", report["summary"]);
     keys.iter().map(|key| &report[*key]).collect()
@@ -225,7 +225,7 @@ fn head_order_does_not_change_results() {
     folder.write("reordered.toml", reordered(&vehicle, 3));
     let (_, got) = folder.replay("dive.mcap", &["--vehicle", "reordered.toml"]);
     assert_eq!(got["sources"][0]["id"], "sonar_2", "the order of heads hasn't changed");
-    // Causes may differ. Start angles, and so phases, are assigned in the order of the heads.
+    // Causes of failed sections may differ, because start angles and phases are assigned in the order of the heads.
     let [got, expected] = [got, expected].map(|mut report| {
         for section in report["sections"].as_array_mut().unwrap() {
             section.as_object_mut().unwrap().remove("cause");
@@ -236,7 +236,7 @@ fn head_order_does_not_change_results() {
     assert_eq!(answers(&got, &keys), answers(&expected, &keys));
 }
 
-/// A message whose channel has another name.
+/// The same message on a channel with another name.
 fn renamed<'a>(message: &Message<'a>, named: &dyn Fn(&str) -> String) -> Message<'a> {
     let metadata = message.channel.metadata.iter().map(|(key, value)| (key.clone(), named(value))).collect();
     let topic = named(&message.channel.topic);

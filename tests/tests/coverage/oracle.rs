@@ -70,8 +70,8 @@ fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section passed on the samples of some visits alone. Samples of the other visits can only make its hole
-/// smaller.
+/// Whether a section passed and its hole's upper bound, from the samples of some visits alone, is at least this
+/// diameter. The oracle uses the samples of all visits, which can only make the hole smaller.
 fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
     let most_m = section.hole_most_m.filter(|_| section.verdict == Verdict::Pass);
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
@@ -89,7 +89,8 @@ fn holes_are_the_largest_empty_circles() {
                 && [Verdict::Fail, Verdict::Open].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
-        // Packing moves samples by micrometres; the bounds include this movement.
+        // The loop stores samples in packed form, which moves them by micrometres. The reported bounds include this
+        // movement.
         let right =
             section.hole_bounded && (is_within(section, expected_m) || is_of_a_visit(section, expected_m));
         (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
@@ -120,7 +121,8 @@ fn verdicts_follow_from_hole_sigma_and_target() {
         let radius_m = f64::midpoint(target_m, twice_m);
         let ends = [section.start_m, section.end_m];
         let first_m = first_failing_m(wall, ends, radius_m, passed_m);
-        // Whether a circle touches the end of the stretch that all heads have crossed.
+        // Whether the first failing place changes if the start of the stretch that all heads have crossed moves by
+        // `NEAR_M`.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
         // Tolerance for differences between oracle and program. The oracle finds the first failing place to within one
@@ -142,7 +144,7 @@ fn verdicts_follow_from_hole_sigma_and_target() {
             {
                 either
             }
-            // A flag stays until the hole is filled.
+            // A flagged section keeps the verdict "fail" until its hole is filled.
             either @ Verdict::Fail if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
             _ if clear_m > 0.0 => Verdict::Fail,
             _ if behind_m < 0.0 || from_end_m < 0.0 => Verdict::Open,
@@ -218,7 +220,7 @@ fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
 }
 
 #[test]
-fn holes_of_lattices_match_their_exact_values() {
+fn holes_of_sample_lattices_match_exact_values() {
     let diagonal_m = math::sqrt(2.0);
     // A lattice of squares of 0.25 m, in which all four corners of a square are on a common circle. The second
     // section contains no centre of a square.
@@ -245,7 +247,7 @@ fn scattered(seed: u64, count: usize, perimeter_m: f64) -> Vec<Place> {
 }
 
 #[test]
-fn holes_of_small_sets_match_a_dense_search() {
+fn holes_of_small_sample_sets_match_a_dense_grid_search() {
     let (perimeter_m, step_m) = (2.0, 0.004);
     for seed in 0..30 {
         let wall =
@@ -318,7 +320,8 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // Without this return, the pings beside its angle have no T_x in the next turn, and T_y spans the gap.
+    // Ping 20 has no return. So the pings beside its angle have no T_x in the next turn, and T_y of the return after it
+    // spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

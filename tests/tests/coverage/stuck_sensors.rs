@@ -55,8 +55,8 @@ fn dive(scene: &Scene) -> Told {
     }
 }
 
-/// The fault can't be detected within its first second. Its effect in this second is smaller than the margin with which
-/// a section must pass.
+/// A stuck inertial unit can't be detected within a second. During this second, the position error is smaller than the
+/// margin with which a section must pass.
 #[test]
 fn stuck_inertial_unit_is_reported_and_no_section_far_over_the_target_passes() {
     let (mut passed, mut over) = (0, 0);

@@ -62,7 +62,7 @@ fn true_holes_match_a_fine_grid() {
     let strips = Strips::of(&dive.truth);
     let (along, around) = (5_u32, 720_u32);
     let mut judged = 0;
-    // The ends are left out. They are far from all samples, so this search would take long there.
+    // The dive's ends are left out. They are far from all samples, so the grid search would take long there.
     for section in dive.sections.iter().filter(|section| section.true_hole_m < 1.5) {
         let [from_m, to_m] = [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
         let place = |i: u32, j: u32| {
@@ -73,7 +73,8 @@ fn true_holes_match_a_fine_grid() {
         };
         let grid_m = (0..=along).flat_map(|i| (0..around).map(move |j| place(i, j)));
         let grid_m = grid_m.map(|at| 2.0 * strips.clear_m(at)).fold(0.0, f64::max);
-        // Between grid points, the diameter changes by no more than twice the distance to the nearest grid point.
+        // Between grid points, the diameter of an empty circle changes by no more than twice the distance to the
+        // nearest grid point.
         let off_m =
             math::hypot((to_m - from_m) / f64::from(along), dive.truth.perimeter_m / f64::from(around));
         let short_m = section.true_hole_m - grid_m;
@@ -96,7 +97,7 @@ fn outline_arc_lengths_match_the_profile() {
     for profile in profiles {
         let outline = Outline::of(&profile);
         for k in 0..5_000 {
-            // The places are inside and outside the wall, and spread all around it.
+            // The tested points lie inside and outside the wall, all around it.
             let off_m = 0.3 + 1.5 * math::wrap(0.37 * f64::from(k), 1.0);
             let [y, z] = profile.point_at(0.618 * profile.perimeter_m() * f64::from(k));
             let [y0, z0] = profile.reference();
@@ -108,12 +109,13 @@ fn outline_arc_lengths_match_the_profile() {
     }
 }
 
-/// Whether a section isn't at the dive's end and has no samples from before the position estimate converged.
+/// Whether a section is at least 1.5 m beyond the start, where the position estimate has converged, and its true hole
+/// is below 0.7 m, so that it isn't at the dive's end.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }
 
-/// As [`settled`], with a true hole below `hole_m`.
+/// As [`settled`], but with a limit of `hole_m` for the true hole.
 fn settled_below(section: &truth::JudgedSection, start_m: f64, hole_m: f64) -> bool {
     section.report.start_m > start_m + 1.5 && section.true_hole_m < hole_m
 }

@@ -43,12 +43,12 @@ fn far_over(dive: &truth::JudgedDive, target_m: f64) -> usize {
     passed.filter(|section| section.true_hole_m > 1.1 * target_m).count()
 }
 
-/// The counter is stuck for 12 s while the vehicle continues to move.
+/// Simulator fault: the cable counter is stuck for 12 s while the vehicle continues to move.
 const STUCK: &str =
     "[[effects.device_faults]]\nsensors = [\"tether\"]\nkind = \"stick\"\nfrom_s = 60\nfor_s = 12\n";
 
 #[test]
-fn section_sampled_during_a_position_doubt_passes_after_one_complete_visit() {
+fn section_sampled_while_the_counter_is_stuck_passes_after_one_complete_visit() {
     let out = dive(4, &[(12.0, 0.09)], STUCK);
     let back = dive(4, &[(12.0, 0.09), (9.0, -0.09)], STUCK);
     let where_m = [8.0, 13.0];

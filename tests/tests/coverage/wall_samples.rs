@@ -16,7 +16,7 @@ use headrace_tests::scenes;
 use crate::observed;
 
 const VITA: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
-/// A very slow dive in a pipe of 1 m radius.
+/// Scene of a very slow dive in a pipe of 1 m radius.
 const CREEP: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 6\n\
     speed_mps = 0.03\n[effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.005 }\n";
 const DRIFT: &str = "pilot_drift = { across_m = 0.2, up_m = 0.1, yaw_deg = 6, period_s = 15 }\n";
@@ -43,7 +43,7 @@ fn dive(heads: usize, effects: &str) -> Dive {
     instrumented::dive(&pipe(heads), &format!("{CREEP}{effects}"))
 }
 
-/// Alerts that report this head as untrusted.
+/// Alerts that name this head, among those that report an observation about the dive.
 fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a ListedAlertJson> {
     let mut alerts = observed(&dive.report);
     alerts.retain(|alert| alert.sensor.as_deref() == Some(head));
@@ -71,10 +71,10 @@ fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
 /// Returns and sections of a dive in murk, compared with the objects that the beams truly met.
 #[derive(Debug, Default)]
 struct Compared {
-    /// Number of returns from the wall, and number of these that the loop classified as doubtful.
+    /// Number of returns from the wall, and how many of them the loop classified as doubtful.
     met: usize,
     met_doubtful: usize,
-    /// Number of returns from other objects, and number of these that the loop accepted as wall.
+    /// Number of returns from objects other than the wall, and how many of them the loop accepted as wall.
     strays: usize,
     strays_wall: usize,
     /// Number of passed sections, and their largest ratio of true hole to target.

@@ -28,7 +28,7 @@ use headrace_tests::random::Random;
 use crate::corpus::{Corpus, Kind, OTHERS};
 use crate::messages::{Said, said};
 
-/// Vehicles and mappings that the readers need.
+/// Vehicle configurations that the readers under test need.
 pub(crate) struct Surroundings {
     vehicle: VehicleConfig,
     /// Vehicles with devices that send data. The sensor numbers of the second vehicle begin at `OTHERS`.
@@ -124,7 +124,7 @@ impl Surroundings {
     }
 }
 
-/// Tries a file with arbitrary content.
+/// Gives a file with arbitrary content to its reader.
 ///
 /// Errors: a description of the fault that the reader showed.
 pub(crate) fn try_one(
@@ -184,7 +184,7 @@ fn is_vouched_for(log: &[u8]) -> bool {
     true
 }
 
-/// Number of items that the reader gets from a file.
+/// Number of items (messages, sensors or readings) that the reader gets from an intact file.
 pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     match kind {
         Kind::Log => said(bytes).unwrap().0.len() as u64,
@@ -210,7 +210,8 @@ fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     let mut said = Ok(());
     while !rest.is_empty() {
         let (now, later) = rest.split_at((1 + random.below(24)).min(rest.len()));
-        // The next piece usually follows at once, but sometimes after a silence or with an earlier timestamp.
+        // The next piece of the device's bytes usually follows at once, but sometimes after a silence or with an
+        // earlier timestamp.
         at = match random.below(40) {
             0 => at + DurNs::from_millis(3_600_000),
             1 => MonoNs(at.0.saturating_sub(1_000_000_000)),
@@ -286,8 +287,8 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
 /// Imports a file into a log, and checks that the log is intact.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        // Of these kinds, only ROS recordings have an importer. So files of all these kinds are tried as ROS
-        // recordings.
+        // Among these kinds of file, only ROS recordings have an importer. So the fuzzer imports files of all these
+        // kinds as ROS recordings.
         Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());

@@ -21,7 +21,7 @@ fn with_a_late_channel() -> Vec<u8> {
     [&data, &summary, &footer, MAGIC].concat()
 }
 
-/// Messages and losses in the rest of a log.
+/// Messages in the rest of a log, and all losses that the reader has reported.
 fn rest(log: &mut LogReader<Cursor<Vec<u8>>>) -> (Vec<Vec<u8>>, Vec<String>) {
     let mut messages = Vec::new();
     while let Some(message) = log.next().unwrap() {

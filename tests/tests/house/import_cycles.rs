@@ -31,7 +31,7 @@ type Module = Vec<String>;
 
 #[derive(Debug, Default)]
 struct Content {
-    /// One file in most cases; several files if features choose between them.
+    /// Files of the module: usually one, but several if Cargo features choose between them.
     files: Vec<PathBuf>,
     used: Vec<Used>,
     reexports: BTreeMap<String, Vec<String>>,

@@ -6,14 +6,14 @@ enum Token<'a> {
     Word(&'a str),
     /// `::`
     Separator,
-    /// Content of a plain string.
+    /// Content of a string literal that isn't raw.
     Text(&'a str),
     Mark(char),
 }
 
 use Token::{Mark, Separator, Text, Word};
 
-/// A module with its own file.
+/// Declaration of a module that has its own file (`mod name;`).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Declared {
     /// Names of the inline modules around the declaration, followed by the name of the module itself.
@@ -22,7 +22,7 @@ pub(crate) struct Declared {
     pub(crate) file: Option<String>,
 }
 
-/// A path that is used in a file.
+/// A path (such as `crate::a::b`) that a file imports or names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Used {
     /// Names of the inline modules around the path.
@@ -36,7 +36,7 @@ pub(crate) struct Imports {
     pub(crate) modules: Vec<Declared>,
     /// Paths of `use` declarations, and paths in code that begin with `crate`, `super` or `self`.
     pub(crate) used: Vec<Used>,
-    /// `pub use`: the public name and the path behind it.
+    /// Reexports by `pub use`: the public name, and the path to which it refers.
     pub(crate) reexports: Vec<(String, Vec<String>)>,
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn imports(text: &str) -> Imports {
                     }
                 }
             }
-            // The condition excludes `use<..>` in a type.
+            // The condition `!= Mark('<')` excludes `use<..>`, a capture list in a type.
             [Word("use"), next, ..] if *next != Mark('<') => {
                 let end = here.iter().position(|token| *token == Mark(';')).unwrap_or(here.len());
                 let (front, mut leaves) = (Front::of(before), Vec::new());

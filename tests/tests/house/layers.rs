@@ -24,7 +24,8 @@ const FOR_REPLAY: [(&str, &[&str]); 3] = [
     ),
 ];
 
-/// Names that the core may not use: time, randomness, files, ports, threads, environment, locks and unbounded queues.
+/// Rust paths and names that the core may not use: time, randomness, files, ports, threads, environment, locks and
+/// unbounded queues.
 const BARRED_FROM_CORE: [&str; 13] = [
     "std::fs",
     "std::net",
@@ -50,7 +51,7 @@ const LAB: [&str; 4] = ["lab/cost", "lab/engine", "lab/experiments", "lab/tables
 /// The operator's page, a plugin that isn't a device.
 const PAGE: &str = "plugins/dashboard";
 
-/// Whether a package in the folder `place` may depend on a package in the folder `needed`.
+/// Whether the package in the folder `place` may depend on the package in the folder `needed`.
 fn may_need(place: &Path, needed: &Path) -> bool {
     let core = |needed: &Path| CORE.iter().position(|name| needed == Path::new("core").join(name));
     let one_of = |names: &[&str]| names.iter().any(|name| needed == Path::new("core").join(name));
@@ -133,7 +134,7 @@ fn core_has_no_io_and_no_locks() {
     assert!(sources.len() > 20, "{} files", sources.len());
     for (path, text) in sources {
         for (number, line) in text.lines().enumerate() {
-            // Comments may mention these names.
+            // Comments in the core may mention the forbidden names.
             let code = line.split("//").next().unwrap_or_default();
             for barred in BARRED_FROM_CORE.iter().filter(|barred| code.contains(**barred)) {
                 said.push(format!("{}:{}: {barred}", path.display(), number + 1));

@@ -265,7 +265,7 @@ fn imported_table_becomes_the_bytes_of_its_sensors() {
     let heard =
         |id: &str| sources.iter().find(|source| source["id"] == id).unwrap()["frames"].as_u64().unwrap();
     assert_eq!((heard("imu"), heard("ping_left"), heard("tether")), (12, 3, 4));
-    // Three pressures, calibrated with the constants from the sensor's memory.
+    // Three raw pressures, calibrated with the constants from the sensor's memory.
     assert_eq!(counts["depth"], heard("depth"));
     assert!(heard("depth") > 3);
     std::fs::remove_file(folder.path("out.mcap")).unwrap();

@@ -27,7 +27,7 @@ struct Wanted {
     roll: [f64; 2],
     pitch: [f64; 2],
     yaw: [f64; 2],
-    /// Number of force readings, and of readings of the first pressure sensor.
+    /// Number of accelerometer readings (specific force), and number of readings of the first pressure sensor.
     forces: usize,
     mean_force_g: f64,
     /// Number of readings of the second pressure sensor.
@@ -66,7 +66,7 @@ fn both() -> Vec<(PathBuf, Wanted)> {
     recordings::both("bluerov2_ardusub_logs/small.tlog", TRIMMED, FULL_LENGTH)
 }
 
-/// Decodes a whole file for one part of the autopilot. Returns the readings and the decoder.
+/// Decodes a whole telemetry file for one sensor of the autopilot. Returns the readings and the decoder.
 fn readings(path: &Path, frames: u64, part: Part) -> (Vec<Decoded>, MavlinkDecoder) {
     let file = std::fs::read(path).unwrap();
     let meaning = DecoderSettings { part, system_id: Some(1), component_id: Some(1), latency: DurNs::ZERO };

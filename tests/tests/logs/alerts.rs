@@ -181,7 +181,7 @@ fn commands_change_no_result_except_alerts() {
         }
     }
     assert_eq!(one, other);
-    // Invalid commands change nothing at all.
+    // Invalid operator commands change nothing at all.
     let mut packets = sent(&scene);
     let source = scene.vehicle.sensors.len();
     for (number, bytes) in
@@ -204,17 +204,18 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
             told.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
-    // The second alert follows after the way back. On the way back, any speed is allowed.
+    // The second too-fast alert follows only after the way back, because any speed is allowed on the way back.
     let too_fast = raised(ListKind::TooFast);
     assert!(matches!(too_fast[..], [first, again] if first < 10.0 && again > 100.0), "{too_fast:?}");
-    // After the fast stretch, the alert still shows the speed that was too fast, not a later speed.
+    // After the fast stretch, the too-fast alert still shows the speed that was too fast, not a later speed.
     let fast = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
     let Figures::Advice(figures) = fast.figures else { panic!("{:?}", fast.figures) };
     assert!(figures.speed_mps > 1.2 * figures.v_max_mps, "{figures:?}");
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
         panic!("{:?}", raised(ListKind::SensorSilent))
     };
-    // The alert comes 2 s after the head's last reading, plus one update. No latch time is configured.
+    // The alert for the dead head is raised 2 s after the head's last reading, plus one update. No latch time is
+    // configured.
     assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
     let head = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
     assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");

@@ -11,7 +11,7 @@ const TICKS_MS: [&str; 6] = ["1", "5", "20", "100", "777", "60000"];
 
 /// Runs `work` while `threads` threads keep the cores busy.
 fn while_busy<T>(threads: usize, work: impl FnOnce() -> T) -> T {
-    /// Ends the busy threads, even if `work` panics.
+    /// Ends the busy threads when it is dropped, even if `work` panics.
     struct Stop<'a>(&'a AtomicBool);
     impl Drop for Stop<'_> {
         fn drop(&mut self) {
@@ -79,7 +79,7 @@ fn each_difference_from_the_expected_report_is_named() {
     let (_, mut report) = folder.replay("dive.mcap", &["--report", "golden.json"]);
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
 
-    // A different name of the log is allowed, but any change of a hole is a difference.
+    // Only a different file name of the log is allowed; any change of a hole's diameter counts as a difference.
     report["log"]["path"] = "elsewhere.mcap".into();
     folder.write("golden.json", report.to_string());
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
@@ -132,7 +132,7 @@ fn golden_report_may_state_tolerances() {
     assert_eq!(meets(serde_json::json!({"/sections": -1}), &same), 2);
     let answer = folder.headrace(&["replay", "dive.mcap", "--expect", "golden.json"]);
     assert!(answer.stderr.contains("tolerances of \"/sections\" is -1"), "{}", answer.stderr);
-    // A renewed report keeps its tolerances.
+    // A renewed golden report keeps its tolerances.
     meets(serde_json::json!({"/digest": "any"}), &other);
     folder.replay("dive.mcap", &["--expect", "golden.json", "--bless"]);
     let golden: serde_json::Value = serde_json::from_slice(&folder.read("golden.json")).unwrap();

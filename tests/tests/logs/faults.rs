@@ -29,7 +29,8 @@ fn has_strace() -> bool {
     can
 }
 
-/// Records a dive with this system fault. The dive is long enough for several syncs. Returns exit code and report.
+/// Records a dive while strace injects this fault into system calls. The dive is long enough for several syncs. Returns
+/// exit code and report.
 fn with_fault(folder: &Folder, fault: &[&str], records: &[&str]) -> (Option<i32>, Value) {
     let strace = [&["strace", "-f", "-qq", "-o", "trace.txt"][..], fault].concat();
     let records: Vec<&str> = records.iter().flat_map(|record| ["--record", record]).collect();
@@ -67,7 +68,7 @@ fn single_failed_sync_is_reported_and_loses_nothing() {
     assert!(code == Some(3) && told.contains("Input/output error") && told.contains("no message"), "{told}");
     assert!(folder.path("log.part002.mcap").exists());
     all_find_it(&folder, "log.mcap", "recording failed in log.mcap");
-    // Both parts replay under the recording's name and give the same dive as the original.
+    // Both parts of the recording replay under its name and give the same dive as the original log.
     assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
     assert_eq!(folder.replay("recovered.mcap", &[]).1["digest"], digest.as_str());
 }
@@ -185,7 +186,7 @@ fn unread_stderr_does_not_block_a_failing_recording() {
     let folder = Folder::with_dive();
     let Some(limit) = limit(&folder) else { return };
     let (reader, mut stderr) = std::io::pipe().unwrap();
-    // The pipe is full from the start.
+    // The pipe for stderr is full from the start.
     stderr.write_all(&vec![b'.'; 1 << 16]).unwrap();
     let arguments = ["-vv", "--record", "log.mcap", "--speed", "max", "--report", "report.json"];
     let mut dive = below(&folder, &["prlimit", &limit], &arguments);
@@ -202,7 +203,7 @@ fn wait_for(path: &Path, dive: &mut Child) {
     wait_for_more(path, 0, dive);
 }
 
-/// Waits until a file is longer than `than` bytes; returns its length.
+/// Waits until a file grows beyond `than` bytes; returns the file's new length.
 fn wait_for_more(path: &Path, than: u64, dive: &mut Child) -> u64 {
     loop {
         let len = std::fs::metadata(path).map_or(0, |file| file.len());
@@ -268,7 +269,7 @@ fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
             // The program installs its signal handlers before it prints the first line.
             lines.next().unwrap().unwrap();
         } else {
-            // The first write contains only the header, so the test also waits for later writes.
+            // The first write to the log contains only the header, so the test also waits for later writes.
             wait_for(&folder.path("log.mcap"), &mut dive);
             std::thread::sleep(Duration::from_secs(1));
         }
@@ -330,7 +331,7 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
         assert_eq!(report["digest"], digest.as_str());
         assert!(losses(&report).contains(words), "{words}: {}", losses(&report));
-        // The second part has the rest of the data and states the loss before it.
+        // The second part of the recording has the rest of the data and states the loss before it.
         let (code, rest) = folder.replay("log.part002.mcap", &[]);
         assert!(code == Some(3) && losses(&rest).contains(words), "{code:?}: {}", losses(&rest));
         assert!(rest["log"]["messages"].as_u64() > Some(1000), "{}", rest["log"]);

@@ -87,7 +87,7 @@ fn sequence_publish_time_and_channel_ids_are_ignored() {
 }
 
 #[test]
-fn other_channels_are_skipped() {
+fn channels_without_device_data_are_skipped() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let dive = folder.read("dive.mcap");

@@ -19,7 +19,7 @@ use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 use serde_json::Value;
 
-/// Stops of a playback: time, tick number, digest, and whether playback was at the end.
+/// Records each stop of a playback: time, tick number, digest, and whether playback was at the end of the log.
 #[derive(Default)]
 struct Stops(Vec<(MonoNs, u64, u64, bool)>);
 
@@ -49,7 +49,7 @@ fn armed(vehicle: &VehicleConfig) -> Loop {
     app.arm(vehicle.navigation()).unwrap()
 }
 
-/// Result of a finished dive.
+/// Result of a replayed dive.
 #[derive(Debug, PartialEq)]
 struct Outcome {
     digest: u64,
@@ -68,7 +68,7 @@ impl Outcome {
 #[test]
 fn headrace_log_replays_in_order_of_consumption_and_other_logs_by_time() {
     let folder = Folder::new();
-    // Source and receive time of each packet in recorded order.
+    // Source and receive time of each packet, in the order in which the packets are recorded.
     let recorded = [(2, 3_000), (0, 1_000), (1, 2_000), (1, 2_500), (0, 2_200)];
     for (ticks, wanted) in [(true, [2, 0, 1, 1, 0]), (false, [0, 1, 0, 1, 2])] {
         let mut app = App::new(vehicle().mission());
@@ -90,7 +90,7 @@ fn headrace_log_replays_in_order_of_consumption_and_other_logs_by_time() {
         folder.write("order.mcap", bytes);
         let mut player = Player::open(&files_of(&[folder.path("order.mcap")]).unwrap()).unwrap();
         player.connect(dive.sources());
-        // Sources of the packets in the order in which the loop consumes them.
+        // Source of each packet, in the order in which the loop consumes the packets.
         let mut consumed = Vec::new();
         let mut note =
             |dive: &Loop| consumed.extend(dive.view().placed().inbox.iter().map(|(source, _)| source.0));
@@ -224,7 +224,7 @@ fn damage(folder: &Folder, log: &str) {
         at += 9 + usize::try_from(len).unwrap();
     }
     for number in [chunks.len() / 2, chunks.len() / 2 + 1, chunks.len() * 3 / 4] {
-        // The byte lies after the chunk's header.
+        // The damaged byte lies after the chunk's header.
         bytes[chunks[number] + 100] ^= 0x55;
     }
     folder.write(log, bytes);
@@ -319,7 +319,7 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
 /// Other targets are judged in a second replay of the whole log. An unfinished replay covers less of the dive, so the
 /// figures wouldn't be comparable.
 #[test]
-fn unfinished_replay_is_not_judged_by_other_targets() {
+fn unfinished_replay_is_not_compared_with_other_targets() {
     let folder = logs();
     let arguments = ["ticks.mcap", "--speed", "1x", "--target", "0.5,0.3", "--report", "left.json"];
     let answer = interactive(&folder, &arguments, "pause\nseek 12s\nend\n");
@@ -330,7 +330,7 @@ fn unfinished_replay_is_not_judged_by_other_targets() {
 }
 
 #[test]
-fn lines_on_standard_input_pause_step_and_seek() {
+fn commands_on_standard_input_pause_step_and_seek() {
     let folder = logs();
     let lines = "pause\nseek 12s\nstep 3\nback 5s\nstop\nahead 0:02\nspeed max\ngo\n";
     let answer = interactive(&folder, &["ticks.mcap", "--speed", "1x"], lines);

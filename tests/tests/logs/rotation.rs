@@ -7,7 +7,7 @@ use std::time::Duration;
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Number of kills.
+/// Number of dives that the test kills while they are recorded.
 const KILLS: u64 = 12;
 
 fn record(folder: &Folder, further: &[&str]) -> Value {
@@ -85,7 +85,8 @@ fn dive_in_parts_replays_and_verifies_as_one() {
 #[test]
 fn live_report_lists_the_parts_of_the_recording() {
     let folder = Folder::with_dive();
-    // Devices may or may not exist at these addresses. In either case, the data is too little for a second part.
+    // Devices may or may not exist at the vehicle file's addresses. In either case, the data is too little for a second
+    // log part.
     let arguments =
         ["run", "vehicle.toml", "--record", "live.mcap", "--rotate", "1GiB", "--for", "1", "--json"];
     let answer = folder.headrace(&arguments);
@@ -147,7 +148,7 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
         };
         assert_eq!(told["differences"], Value::Array(Vec::new()), "{name}: {told}");
         let lost = told["losses"].as_array().unwrap();
-        // Only the part being written and a part that has just begun may have lost data.
+        // After a kill, only the log part that was being written and a part that had just begun may have lost data.
         assert!(lost.len() <= 2, "{name}: {told}");
         assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {told}");
         same += told["same_records"].as_u64().unwrap();
@@ -162,7 +163,7 @@ fn part_named_twice_is_read_once() {
     let folder = Folder::with_dive();
     record(&folder, &["--record", "a.mcap", "--rotate", "5s"]);
     let digest = folder.digest("a.mcap", &[]);
-    // After an error, the first part has the name of the recording.
+    // If writing a part fails, the first part may have the plain name of the recording.
     std::fs::rename(folder.path("a.part001.mcap"), folder.path("a.mcap")).unwrap();
     let mut names: Vec<String> = std::fs::read_dir(folder.path(""))
         .unwrap()

@@ -29,14 +29,14 @@ use crate::snapshots::{EFFECTS, LEGS, Packet, packets};
 
 const THREADS: [usize; 3] = [1, 2, 3];
 
-/// How a feed ends.
+/// End of the test's feed of packets: normal, with an error, or by a panic.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
-    /// After its last packet.
+    /// The feed ends regularly after its last packet.
     Last,
-    /// With an error at this packet.
+    /// The feed ends with an error at this packet.
     Error(usize),
-    /// By a panic at this packet.
+    /// The feed ends by a panic at this packet.
     Panic(usize),
 }
 
@@ -120,7 +120,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     let (mut ticks, tick) = (Vec::new(), DurNs::from_millis(tick_ms));
     let mut note = |dive: &Loop| ticks.push(of_tick(dive));
     let driven = match threads {
-        // Zero threads stands for the plain `drive`. It is the reference for the function under test.
+        // Zero threads select the plain function `drive`, which is the reference for the tested `drive_on`.
         0 => drive(&mut dive, &mut feed, Pace { tick, speed: None }, &mut note),
         threads => drive_on(threads, &mut dive, &mut feed, tick, &mut note),
     };
@@ -215,7 +215,8 @@ impl Outlet for Behind {
     }
 }
 
-/// A plugin with a system in the placer.
+/// A plugin that adds a system to the placer (the part of the loop that places pings) and counts the packets that the
+/// system sees.
 struct Placing;
 
 #[derive(Resource, Default)]
@@ -259,7 +260,7 @@ fn loop_waits_for_slow_outlets_and_plugins_see_every_packet() {
     }
 }
 
-/// A split loop refuses to be saved or split again.
+/// A loop that is split among threads refuses to be saved or split again.
 #[test]
 fn split_loop_cannot_be_saved_or_split_again() {
     let scene = scene();

@@ -5,7 +5,7 @@ use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
 use serde_json::Value;
 
-/// The dive takes two minutes at a steady speed, so that it has inner sections.
+/// The dive takes two minutes at a steady speed, so that it has sections that aren't affected by its ends.
 const LONG: &str = r#"name = "long dive"
 vehicle = "vehicle.toml"
 
@@ -33,7 +33,7 @@ fn trim(folder: &Folder, output: &str, further: &[&str]) -> Value {
     serde_json::from_str(&answer.stdout).unwrap()
 }
 
-/// Start and verdict of each section within a stretch.
+/// Start chainage and verdict of each section that starts between two chainages.
 fn within(report: &Value, from_m: f64, to_m: f64) -> Vec<(f64, String)> {
     let sections = report["sections"].as_array().unwrap().iter();
     let inside = sections.filter_map(|section| {

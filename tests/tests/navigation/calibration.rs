@@ -97,7 +97,8 @@ fn found<'a>(report: &'a Value, of: &str, what: &str) -> &'a Value {
         .unwrap_or_else(|| panic!("{of} {what}: {report:#}"))
 }
 
-/// Checks that the error of the latency is within three of its standard deviations and within `most_ms`.
+/// Checks that the latency found by `calibrate` differs from the truth by at most three reported standard deviations,
+/// and by less than `most_ms`.
 #[track_caller]
 fn assert_latency(report: &Value, of: &str, truth_ms: f64, most_ms: f64) {
     let row = found(report, of, "latency");
@@ -109,7 +110,8 @@ const LATE_UNIT: &str =
     "line_delay = { sensors = [\"imu\"], latency_ms = 80 }\noutliers = { share = 0.08 }\n";
 const LATE_HEAD: &str = "line_delay = { sensors = [\"front\"], latency_ms = 50 }\n";
 
-/// The errors are a rotated head, a reversed head, a wrong zero of the counter, and a late inertial unit.
+/// The wrong settings are a rotated head, a reversed head, a wrong zero of the cable counter, and the latency of the
+/// inertial unit.
 #[test]
 fn calibrate_finds_wrong_settings_and_proposes_corrections() {
     let front = "position_m = [0.1, 0, 0.04]\nangles_deg = [4, 0, 0]";

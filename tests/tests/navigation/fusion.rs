@@ -8,7 +8,7 @@ use headrace_tests::field::{Figures, POSE, TURN_S, field, figures, nees, rms, sh
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence, Track, dive, filter};
 
-/// Number of seeds. The bounds below are valid for this number of dives.
+/// Number of simulated dives, each with its own seed. The bounds below are valid for this number.
 const SEEDS: u64 = 20;
 /// Distance that the vehicle covers in one turn of its head, m.
 const T_X_M: f64 = TURN_S * 0.197;
@@ -21,7 +21,7 @@ fn mean_of(all: &[Figures], pick: Pick) -> f64 {
     rms(all.iter().map(pick))
 }
 
-/// Results of one dive: with the filter, without the filter, and the errors of its holes.
+/// Results of one simulated dive: with the filter, without the filter, and the errors of the reported holes.
 struct Dives {
     filter: Track,
     without: Figures,
@@ -49,21 +49,21 @@ fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
     pairs.collect()
 }
 
-/// Vehicle file for this inertial unit, which has high noise.
+/// The shipped vehicle file `name`, with the gyro and accelerometer biases of an inertial unit with high noise.
 fn told(name: &str) -> Result<Vec<u8>, String> {
     let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
     let unit = "[navigation]\ngyro_bias_degps = 0.2\ngyro_bias_time_s = 300\naccel_bias_mps2 = 0.02";
     Ok(file.replace("[navigation]", unit).into_bytes())
 }
 
-/// Smallest share of sections whose hole error is within two standard deviations. The goal is 0.9. With a noisy unit,
-/// the walls correct the attitude only partly. Neighbouring passes then have less yaw error in common than the filter
-/// assumes.
+/// Smallest allowed share of sections whose hole error is within two standard deviations if heads are far apart along
+/// the hull. The goal is 0.9. With a noisy unit, the walls correct the attitude only partly. Neighbouring passes then
+/// have less yaw error in common than the filter assumes.
 const LEAST_APART: f64 = 0.8;
 
-/// If heads are apart along the hull, neighbouring passes are made at quite different times.
+/// If heads are mounted far apart along the hull, they pass neighbouring lines on the wall at quite different times.
 #[test]
-fn hole_errors_of_heads_apart_along_the_hull_are_within_reported_bounds() {
+fn hole_errors_of_separately_mounted_heads_are_within_reported_bounds() {
     let mut all = Vec::new();
     for (seed, slack) in [(1, "reach_m = 0.03, period_s = 10"), (2, "reach_m = 0.05, period_s = 30")] {
         let text = format!(
@@ -78,7 +78,7 @@ fn hole_errors_of_heads_apart_along_the_hull_are_within_reported_bounds() {
         let scene = scenes::seeded(&text, &told, Some(seed));
         let ours = dive(&scene, filter(&scene), Silence::default());
         let errors = hole_errors(&ours, &tracking::true_dive(&scene));
-        // Sections at the ends have no neighbours on one side.
+        // Sections at the ends of the dive are left out, because they have no neighbours on one side.
         all.extend(errors.iter().skip(12).rev().skip(12).copied());
     }
     holes_within_their_bounds(&all, LEAST_APART);

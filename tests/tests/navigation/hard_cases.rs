@@ -39,8 +39,8 @@ fn way() -> String {
 #[derive(Debug, Default)]
 struct Errors {
     turn_rad: f64,
-    /// Largest error while the hull is within 30 degrees of the tunnel's axis, in either direction, m. `anywhere_m`
-    /// is the largest error at any angle.
+    /// Largest position error while the hull is within 30 degrees of the tunnel's axis, in either direction, m.
+    /// `anywhere_m` is the largest position error at any angle of the hull.
     along_axis_m: f64,
     anywhere_m: f64,
     upside_down: u32,

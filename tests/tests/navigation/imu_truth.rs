@@ -30,7 +30,7 @@ const GRAVITY_MPS2: f64 = 9.81;
 const SAMPLE_S: f64 = 0.0105;
 /// Number of samples between updates of the error state. As in the filter, the time between them is about 0.1 s.
 const EPOCH: usize = 10;
-/// Number of samples per second.
+/// Number of inertial samples per second in the recording.
 const SECOND: usize = 95;
 /// Usual speed of a hand, m/s. It is the prior for the velocity, which nothing measures.
 const HAND_MPS: f64 = 0.5;
@@ -40,7 +40,7 @@ const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;
 
-/// A sample in the axes of the body. The axes of the tunnel are east, north and up.
+/// An inertial sample in the axes of the body. The tunnel's axes stand for east, north and up.
 #[derive(Clone, Copy)]
 struct Sample {
     rate_radps: Vec3<Body>,
@@ -90,7 +90,7 @@ fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
     Rot::from_roll_pitch_yaw(roll, pitch, 0.0)
 }
 
-/// Errors of a filter, degrees.
+/// Attitude errors of a filter, degrees.
 #[derive(Debug, Clone, Copy)]
 struct Off {
     inclination_rms: f64,
@@ -99,7 +99,7 @@ struct Off {
     drift: f64,
 }
 
-/// Runs a filter over all samples; returns its errors.
+/// Runs an attitude filter over all samples; returns its errors.
 fn judge(samples: &[Sample], mut filter: impl FnMut(&Sample) -> Rot<Tunnel, Body>) -> Off {
     let (mut squares, mut count, mut most) = (0.0, 0.0, 0.0_f64);
     let (mut first, mut drift) = (None, 0.0);
@@ -239,10 +239,10 @@ fn mahony(samples: &[Sample], kp: f64, ki: f64) -> Off {
     judge_peer(samples, |rate, force| *filter.update_imu(&rate, &force).unwrap())
 }
 
-/// A filter's name and its errors.
+/// Name of an attitude filter, and its errors.
 type Judged = (String, Off);
 
-/// The filter with the smallest inclination error.
+/// The attitude filter with the smallest inclination error.
 fn best(many: impl Iterator<Item = Judged>) -> Judged {
     many.min_by(|(_, a), (_, b)| a.inclination_rms.total_cmp(&b.inclination_rms)).unwrap()
 }

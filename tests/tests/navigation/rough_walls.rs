@@ -9,7 +9,8 @@ use headrace_simulator::START;
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence};
 
-/// Returns the root mean square of yaw error / standard deviation, and the largest standard deviation, radians.
+/// Returns the root mean square of the yaw error divided by its standard deviation, and the largest standard deviation
+/// of yaw, radians.
 ///
 /// The figures cover all seeds, and the time from 15 to 30 s after the launch.
 fn yaw(rough: &str) -> (f64, f64) {

@@ -17,11 +17,11 @@ use headrace_tests::tracking::{self, Epoch, Silence, Track, dive, filter};
 use headrace_vehicle::NavigationConfig;
 
 const SEEDS: u64 = 3;
-/// Capacity for the filter's steps in a dive of ten minutes.
+/// Capacity of the journal of filter steps, enough for a dive of ten minutes.
 const STEPS: usize = 1 << 13;
 
 struct Smoothed {
-    /// Track from the filter.
+    /// Track of a dive with the filter's positions.
     filter: Track,
     /// Track of a dive with the smoothed positions.
     dive: Track,
@@ -64,8 +64,8 @@ const SLACK: f64 = 1.25;
 
 struct Dives {
     smoothed: Smoothed,
-    /// For each section, the error of its hole and the reported standard deviation, m. The first list is filtered, the
-    /// second one smoothed.
+    /// For each section, the error of its hole and the reported standard deviation, m. The first list is for filtered
+    /// positions, the second one for smoothed positions.
     holes: [Vec<(f64, f64)>; 2],
 }
 
@@ -104,7 +104,7 @@ fn smoothing_reduces_errors_and_stays_consistent() {
     let by_filter: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.filter)).collect();
     let smoothed: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.dive)).collect();
     println!("| rms over {SEEDS} dives | filter | smoothed |\n|---|---|---|");
-    // The last number of a row is the allowed ratio of the smoothed error to the error of the filter.
+    // The last number of a row is the largest allowed ratio of the smoother's error to the filter's error.
     let rows: [(&str, Pick, f64); 8] = [
         ("across, m", |f| f.across_m, 0.5),
         ("up, m", |f| f.up_m, 0.5),
@@ -228,7 +228,8 @@ fn smoothed_track_is_split_at_a_lost_estimate() {
     assert!(track.epochs.iter().all(|epoch| epoch.factors.is_sound()));
 }
 
-/// The short dive at three times its length, with noise, steel, and far more slack than the filter assumes.
+/// Effects for a dive three times as long as the usual short dive: sensor noise, steel that disturbs the compass, a
+/// drifting pilot, and far more cable slack than the filter assumes.
 const NOISE: &str = "
 [effects]
 imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.002, attitude_deg = 0.5 }

@@ -21,7 +21,7 @@ fn replayed_with(folder: &Folder, further: &[&str]) -> (Serving, Viewer) {
     (serving, viewer)
 }
 
-/// First and last time of the log.
+/// First and last time of the log that the viewer can play back, s.
 fn span_s(viewer: &Viewer) -> [f64; 2] {
     ["from_s", "to_s"].map(|key| viewer.state["playback"][key].as_f64().unwrap())
 }
@@ -128,7 +128,7 @@ fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
     let (serving, mut lost) = replayed(&folder);
     // A seek back restarts the dive with fewer sections. Afterwards the connection is lost, while the dive goes on.
     let [from_s, to_s] = span_s(&lost);
-    // The time is late in the dive, so that a part of the tunnel has final verdicts.
+    // The seek leads to a time late in the dive, when a part of the tunnel has final verdicts.
     let middle_s = to_s - 0.1 * (to_s - from_s);
     lost.send(&json!({"do": "play", "command": "pause"}));
     lost.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
@@ -244,7 +244,8 @@ fn other_programs_can_read_widgets_state_schema_and_metrics() {
     let icon = extras["widgets"][0]["iconUrl"].as_str().unwrap();
     let (status, picture) = serving.ask("GET", &icon[icon.find("/assets").unwrap()..], &[], "");
     assert!(status == 200 && picture.contains("<svg"), "{icon}: {status}");
-    // Meanwhile the dive goes on to the end of the log. Then both sides have its last state.
+    // While the test asks, the dive goes on to the end of the log. Then both the page's server and the viewer have the
+    // last state.
     loop {
         let (status, answer) = serving.ask("GET", "/state.json", &[], "");
         let body = answer.split("\r\n\r\n").nth(1).unwrap();

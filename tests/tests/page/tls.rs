@@ -24,7 +24,7 @@ use crate::ANY;
 
 const TOKENS: &str = "operator = operator-0123456789abcdef\nviewer = viewer-0123456789abcdef\n";
 const TOKEN: &str = "Authorization: Bearer viewer-0123456789abcdef";
-/// Longest time to wait for an answer.
+/// Longest time to wait for the server's answer.
 const WITHIN: Duration = Duration::from_mins(2);
 
 type Secured = StreamOwned<ClientConnection, TcpStream>;
@@ -99,7 +99,7 @@ fn tls_page_requires_a_token() {
 }
 
 #[test]
-fn feed_works_over_tls() {
+fn viewer_feed_works_over_tls() {
     let folder = Folder::with_dive();
     let serving = serving(&folder);
     let address = &serving.address;

@@ -159,7 +159,8 @@ fn voice_note_has_its_start_time_and_its_bytes_in_the_log() {
         folder.headrace(&["export", "silent.mcap", "--html", "silent.html"]);
         folder.read("silent.html").len()
     });
-    // In the page, the recording is base64, then compressed, and then base64 again.
+    // In the exported page, the voice recording is encoded as base64, then compressed, and then encoded as base64
+    // again.
     assert!(spoken > silent + audio.len(), "{spoken} and {silent} bytes: the page doesn't contain the voice");
 }
 
@@ -321,7 +322,7 @@ fn voice_note_is_in_the_log_part_of_its_time() {
     speak(7, &audio[0]);
     // No device is connected, so the dive records nothing but operator commands.
     while !folder.path("parts/dive.part002.mcap").exists() {
-        // The commands come as fast as the page allows an operator to send them.
+        // The test sends commands as fast as the page allows an operator to send them.
         let (status, answer) = serving.ask("POST", "/actions/silence", &[], "{}");
         assert!([200, 429].contains(&status), "{answer}");
     }

@@ -11,7 +11,7 @@ const RENEW: &str = "HEADRACE_RENEW_WORDS";
 
 /// Rewrite the table with `HEADRACE_RENEW_WORDS=1 cargo test -p headrace_tests --test page words`.
 #[test]
-fn table_of_words_equals_the_words_of_the_program() {
+fn displayed_words_of_the_page_equal_those_of_the_program() {
     let path = root().join(TABLE);
     if std::env::var_os(RENEW).is_some() {
         std::fs::write(&path, table()).unwrap();
@@ -22,7 +22,7 @@ fn table_of_words_equals_the_words_of_the_program() {
 }
 
 #[test]
-fn table_of_words_has_every_code_of_the_schema() {
+fn displayed_words_of_the_page_cover_every_code_of_the_schema() {
     let schema: Value =
         serde_json::from_str(include_str!("../../../docs/reference/live-state.schema.json")).unwrap();
     let table = table();

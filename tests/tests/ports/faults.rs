@@ -12,7 +12,7 @@ use headrace_tests::garbling::{EachFrame, Garbled, flipped, of_head, of_ping, th
 use headrace_tests::random::Random;
 use headrace_tests::rig::{COUNTER, DEPTH, HEAD, PING, Rig, Sensor};
 
-/// A sensor whose line is sound.
+/// A sensor on a line without faults, which other sensors' faults must not disturb.
 fn healthy() -> Sensor {
     Sensor { text: COUNTER, end: End::udp(), fault: Box::new(Healthy) }
 }
@@ -21,14 +21,15 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
 }
 
-/// Statuses of a sound sensor that appear only because the machine is busy. The tests ignore them.
+/// Beginnings of statuses that a sensor without faults has only because the machine is busy. The tests ignore these
+/// statuses.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
     "wrong: falls behind because replies are lost",
     "silent: the line is open, but no frame has arrived yet",
 ];
 
-/// Statuses of a sensor, each listed once. The list is the same on a busy machine and on an idle one.
+/// Distinct statuses of a sensor as text, except "running" and those due to a busy machine.
 fn words(said: &[String]) -> String {
     let mut all: Vec<String> = Vec::new();
     for status in said {
@@ -177,7 +178,8 @@ fn lost_bytes_lose_only_their_own_frames() {
     garbled(thinned);
 }
 
-/// Inserts garbage between frames. The garbage ends with the header of a longer frame, whose bytes never come.
+/// A line that inserts garbage between frames. The garbage ends with the header of a longer frame, whose bytes never
+/// come.
 fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
     let mut random = Random(seed);
     EachFrame(move |_, frame: &[u8], line: &mut Wire| {
@@ -194,7 +196,8 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 #[test]
 fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // The headers in the garbage announce a profile of 1200 strengths and a return of 500 points.
+    // The frame headers in the garbage announce an echosounder profile of 1200 strengths and a head's return of 500
+    // points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),
@@ -213,7 +216,8 @@ fn bursts_of_garbage_lose_no_frame() {
     ended.untroubled(2);
 }
 
-/// Stalls in the middle of every third frame. The stall is shorter than the usual pause, is longer, or lasts for ever.
+/// A device that stalls in the middle of every third frame. The stall is shorter than the usual pause between frames,
+/// is longer, or lasts for ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);
@@ -281,7 +285,7 @@ fn two_answers_to_one_request_are_two_readings() {
     assert_eq!(depth.withheld, 0, "the calibration is whole before the first measurement: {depth:?}");
 }
 
-/// A device that claims to be another one until its fault ends.
+/// A device that claims to be another device until its fault ends.
 struct Disguised(fn(&mut Vec<u8>));
 
 impl Fault for Disguised {
@@ -343,7 +347,7 @@ fn wrong_device_is_reported_and_the_right_one_used_later() {
     "#);
 }
 
-/// Sends garbage as fast as the line accepts it.
+/// A device that sends garbage as fast as the line accepts it.
 struct Babbling(Random);
 
 impl Fault for Babbling {
@@ -396,7 +400,7 @@ fn silent_device_is_reported_and_used_when_it_returns() {
     "#);
 }
 
-/// Loses the host's first requests.
+/// A line that loses the host's first requests.
 struct DeafAtFirst(usize);
 
 impl Fault for DeafAtFirst {

@@ -57,7 +57,7 @@ const RUN: [&str; 7] = ["run", "vehicle.toml", "--no-record", "--report", "repor
 /// Arguments of a run without a time limit.
 const RUN_UNTIL: [&str; 2] = ["vehicle.toml", "--no-record"];
 
-/// Whether the first sensor has given readings and was reported as running.
+/// Whether the report's first sensor has more than ten readings and the status "running".
 fn first_runs(report: &Value) -> bool {
     let first = &report["sources"][0];
     let status = first["line"]["status"].as_str().unwrap_or_default();
@@ -230,7 +230,7 @@ fn unavailable_required_sensor_ends_the_dive() {
     "#);
 }
 
-/// Reports that are too short, as from a counter by another maker.
+/// A device whose HID reports are too short, like those of a counter by another maker.
 struct Short;
 
 impl Fault for Short {

@@ -18,7 +18,7 @@ use headrace_vehicle::VehicleConfig;
 const START: MonoNs = MonoNs(1_000_000_000);
 const FRAMES: usize = 60;
 
-/// Devices with byte streams.
+/// Sensor tables of devices that send byte streams, which can be split anywhere.
 const STREAMS: [&str; 7] = [
     "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\n",
     "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\nreturns = \"imx\"\n",
@@ -28,14 +28,15 @@ const STREAMS: [&str; 7] = [
     "plugin = \"a50\"\n",
     "plugin = \"mavlink\"\npart = \"imu\"\nsystem_id = 1\n",
 ];
-/// Devices on carriers that keep messages whole. Their messages can only be late.
+/// Sensor tables of devices on carriers (such as CAN) that keep messages whole. Their messages can be late, but not
+/// split.
 const MESSAGES: [&str; 3] = [
     "plugin = \"imu_can\"\npreset = \"xsens_mti600\"\n",
     "plugin = \"bar100\"\n",
     "plugin = \"tether_hid\"\ncounts_per_metre = 2000\n",
 ];
 
-/// Collects the messages that a driver delivers.
+/// Collects the packets that a driver delivers to the loop.
 #[derive(Default)]
 struct Delivered(Vec<(MonoNs, Vec<u8>)>);
 
@@ -72,7 +73,7 @@ fn told<M: Measurement>(device: &mut dyn Emulator<M>, mut feel: impl FnMut(&mut 
     frames
 }
 
-/// Frames of the device.
+/// Frames that the emulated device sends.
 fn frames(device: &dyn Device, random: &mut Random) -> Vec<Vec<u8>> {
     let setup = EmulatorSetup {
         start: START,
@@ -142,14 +143,14 @@ fn wake_until(driver: &mut dyn Driver, at: MonoNs, wire: &mut dyn Wire) {
     }
 }
 
-/// Draws the delay of a part. It is usually that of a good line, and sometimes that of a serial bridge, of a slow
-/// network, or of a network that fails for seconds.
+/// Draws the delay of one part of a stream. It is usually that of a good line, and sometimes that of a serial bridge,
+/// of a slow network, or of a network that fails for seconds.
 fn delay(random: &mut Random) -> DurNs {
     let ms = [1, 1, 3, 20, 66, 66, 120, 250, 1500, 4000];
     DurNs::from_millis(ms[random.below(ms.len())])
 }
 
-/// Each frame as a whole, with the time of the part that contains its first byte.
+/// Each complete frame, with the receive time of the part that contains the frame's first byte.
 fn whole<'a>(frames: &'a [Vec<u8>], parts: &[(MonoNs, &[u8])]) -> Vec<(MonoNs, &'a [u8])> {
     let mut ends = Vec::new();
     for (at, part) in parts {

@@ -35,7 +35,8 @@ fn lines() -> [Lines; 2] {
     })
 }
 
-/// All parts have the same time, so that readings can't depend on the times at which bytes arrive.
+/// All parts of the byte stream have the same receive time, so that readings can't depend on the times at which bytes
+/// arrive.
 const AT: MonoNs = MonoNs(1_000_000_000);
 
 fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {

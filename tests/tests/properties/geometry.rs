@@ -1,4 +1,4 @@
-//! Rays in random cross-sections, compared with the plain formula for each edge.
+//! Hits of rays on the walls of random cross-sections, compared with the formula for each edge.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
@@ -111,7 +111,8 @@ fn rays(case: &mut Case) -> Result<(), String> {
     inverses(case, &profile)
 }
 
-/// Converts an arc length to a place and back, both in a polygon and in a shape of arcs.
+/// Converts an arc length to a place on the wall and back, in a polygon and in a shape made of arcs. Checks that the
+/// direction from the reference point stays the same.
 fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
     let width_m = case.between(0.5, 12.0);
     let shape = match case.below(3) {
@@ -136,12 +137,12 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
 }
 
 #[test]
-fn rays_match_the_plain_formula() {
+fn ray_hits_match_the_formula_for_each_edge() {
     few("geometry", &rays);
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn rays_match_the_plain_formula_in_a_long_run() {
+fn ray_hits_match_the_formula_for_each_edge_in_a_long_run() {
     many("geometry", &rays);
 }

@@ -5,7 +5,8 @@ use headrace_oracle::wall::Wall;
 
 use crate::{Case, few, many};
 
-/// Samples that are random, on a lattice, on a line, at one place, coincident, or denser than those of any vehicle.
+/// Draws samples on the wall: at random, on a lattice, on a line, all at one place, partly coincident, or closer
+/// together than those of any vehicle.
 fn samples(case: &mut Case, perimeter_m: f64) -> Vec<[f64; 2]> {
     let count = 1 + case.below(24);
     let kind = case.below(7);

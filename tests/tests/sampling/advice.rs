@@ -14,17 +14,17 @@ use headrace_tests::advised::{Advised, dive};
 use headrace_tests::scenes;
 
 const TICK: DurNs = DurNs(20_000_000);
-/// Chainage at which dives begin, and length of the judged part, m.
+/// Chainage at which dives begin; the second constant is the length of the part that the test evaluates. Both are in m.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
 /// Cases whose median hole exceeds this fraction of the predicted T must fail sections at a tenth more speed.
 const NEAR: f64 = 0.95;
-/// Number of updates in which a vehicle comes to a stop.
+/// Number of advice updates at the end of a dive that the test ignores, because the vehicle is stopping.
 const BRAKING: usize = 15;
-/// Oscillation of a vehicle that a pilot steers.
+/// Simulator effect: the heading oscillates by 10 degrees, as if a pilot steered.
 const SWING: &str = "pilot_drift = { yaw_deg = 10, period_s = 20 }\n";
 
-/// A vehicle on its way along the tunnel.
+/// A test case: a vehicle with its mode, target, offset and heading in the tunnel.
 #[derive(Clone, Copy)]
 struct Case {
     what: &'static str,
@@ -34,7 +34,7 @@ struct Case {
     target_m: f64,
     aside_m: f64,
     yaw_deg: f64,
-    /// Source that sends nothing.
+    /// Id of a source that sends nothing during the dive, if any.
     dumb: Option<&'static str>,
     effects: &'static str,
     filter: bool,
@@ -85,8 +85,8 @@ const SWINGING: [Case; 6] = [
 ];
 
 impl Case {
-    /// Length of the stretch at either end of the dive where the test ignores sections, m. Not all heads have been
-    /// there.
+    /// Length of the stretch at either end of the dive where the test ignores sections, m. Not all heads have passed
+    /// these stretches.
     fn ends_m(&self) -> f64 {
         1.2 * self.target_m + 1.0 + 8.0 * self.yaw_deg.to_radians()
     }
@@ -134,7 +134,7 @@ impl Case {
         alternatives.iter().flatten().find(|other| other.mode.as_str() == self.mode).unwrap().v_max_mps
     }
 
-    /// Advised speed during a dive, and results of dives at this speed and at a tenth more.
+    /// Advised speed during a dive, and results of one dive at this speed and one at a tenth more.
     fn followed(&self) -> Followed {
         let planned_mps = self.planned_mps();
         let v_max_mps = self.dive(planned_mps, planned_mps).median(v_max_mps);
@@ -151,13 +151,13 @@ struct Followed {
     dives: [Advised; 2],
 }
 
-/// Results of the part between the ends.
+/// Results in the part of a dive that the test evaluates, which excludes the ends.
 struct Judged {
     failing: f64,
     passing: f64,
     /// Predicted T at the driven speed, m; median of all updates.
     predicted_t_m: f64,
-    /// Ratio of holes to the predicted T: median and largest over the sections.
+    /// Ratio of the hole diameter to the predicted T: median and maximum over the sections.
     holes: [f64; 2],
 }
 
@@ -234,8 +234,8 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
                 ));
             }
         }
-        // In other cases, holes are smaller than predicted, and fewer sections fail. No hole may be larger than
-        // predicted.
+        // In the cases below `NEAR`, holes are smaller than predicted, and fewer sections fail. In no case may a hole
+        // be larger than predicted.
         if at.holes[1].max(above.holes[1]) > 1.0 {
             broken.push(format!("{}: holes of {:?} and {:?} of T", case.what, at.holes, above.holes));
         }
@@ -329,7 +329,7 @@ fn advice_compensates_lost_returns() {
                 case.what, as_before.passing
             ));
         }
-        // The speed for repeating sections must be near the present limit, because one screen shows both.
+        // The speed advised for repeating sections must be near the present speed limit, because one screen shows both.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
             broken.push(format!(
                 "{}: the repeat speed is {again:.4} m/s, but {v_max_mps:.4} is advised",
@@ -338,7 +338,7 @@ fn advice_compensates_lost_returns() {
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
-    // Single lost returns have little effect.
+    // Lost returns that are isolated have little effect on the advice.
     let few = Case { effects: "missing_returns = { share = 0.05 }\n", ..VITA1 };
     let [sound_mps, mps] = [VITA1, few].map(|case| case.dive(0.1, 0.1).median(v_max_mps));
     assert!((0.85..0.99).contains(&(mps / sound_mps)), "{mps} of {sound_mps}");
@@ -355,7 +355,7 @@ fn advice_states_that_a_lower_speed_does_not_help() {
         assert!(matches!(dive.settled()[0].advice.remedy, Some(Remedy::Mode(_))));
         assert!(Judged::of(&coarse, &dive).failing > 0.98, "{speed_mps} m/s");
     }
-    // The target is met in the alternative mode.
+    // In the alternative mode that the advice names, the vehicle meets the target.
     let Some(Remedy::Mode(mode)) = coarse.dive(0.1, 0.1).settled()[0].advice.remedy else { panic!() };
     let finer = Case { mode: mode.as_str().to_owned().leak(), ..coarse };
     assert!(finer.followed().at.failing <= 0.02, "{mode:?}");

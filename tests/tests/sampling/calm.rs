@@ -6,7 +6,8 @@ use headrace_simulator::position_error_model;
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::Outing;
 
-/// The position errors may differ by a fifth. The advised speed may be up to 7 % below the planned one.
+/// The position errors from `plan` and from the live advice may differ by a fifth. The advised speed may be up to 7 %
+/// below the planned one.
 #[test]
 fn plan_and_live_position_errors_agree() {
     for vehicle in [VEHICLES[0], VEHICLES[1], VEHICLES[3], VEHICLES[5]] {

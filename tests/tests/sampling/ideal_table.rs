@@ -89,7 +89,7 @@ fn ideal_scenes_match_the_table() {
                 100.0 * hole_off,
                 100.0 * t_x_off
             );
-            // The table has three decimals.
+            // The holes in the table have three decimals.
             if (hole_m - expected_m).abs() > 0.001 * expected_m + 0.0005 || t_x_off.abs() > 0.005 {
                 writeln!(misses, "{mode} x {heads}: hole {hole_m} m, T_x {t_x_m} m").unwrap();
             }

@@ -49,7 +49,7 @@ fn phase_error_matches_the_difference_from_the_planned_speed() {
 }
 
 #[test]
-fn one_head_and_heads_in_sectors_have_no_phase_error() {
+fn single_head_and_heads_in_sector_layout_have_no_phase_error() {
     let one = include_str!("../../../deploy/vehicles/vita1.toml");
     let sectors = VEHICLE.replace("layout = \"phase_shift\"", "layout = \"sector_offset\"");
     assert_ne!(sectors, VEHICLE);
@@ -59,7 +59,7 @@ fn one_head_and_heads_in_sectors_have_no_phase_error() {
 }
 
 #[test]
-fn alternatives_list_every_mode_with_the_time_that_it_needs() {
+fn advice_alternatives_list_every_mode_with_the_hours_that_it_needs() {
     let timed = format!("dive_hours = 12\n{VEHICLE}");
     let advice = advice(PLANNED_MPS, &timed);
     let last = advice.last().unwrap();

@@ -19,7 +19,8 @@ const MODES: [(&str, f64, f64); 3] = [("medium", 0.6, 10.8), ("fast", 0.9, 8.0),
 
 type Head = (HeadSpec, Vec<HeadMode>);
 
-/// A head at a place of the vehicle. It faces forward or aft, and its turn time is longer by the factor `slower`.
+/// A head mounted at `place` on the vehicle. It faces forward or aft, and its turn time is longer than that of the mode
+/// by the factor `slower`.
 fn head(place: [f64; 3], aft: bool, radius_m: f64, slower: f64) -> Head {
     let mode = |(name, step_deg, turn_s): (&'static str, f64, f64)| HeadMode {
         name,
@@ -118,7 +119,7 @@ fn in_box(part: &Obstacle, at: Vec3<Body>) -> bool {
     within(Vec3::x) && within(Vec3::y) && within(Vec3::z)
 }
 
-/// Samples of a dive over `length_m` as chainage and arc length.
+/// Samples of a dive over `length_m`, each as chainage and arc length, m.
 fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: Way) -> Vec<[f64; 2]> {
     let schedule = planner.schedule(mode, speed_mps).unwrap();
     let inspection = planner.inspection();
@@ -185,7 +186,7 @@ impl Wall {
         ]
     }
 
-    /// Distance to the nearest sample, m.
+    /// Distance from a point on the wall to the nearest sample, m.
     fn clear_m(&self, [x, sigma]: [f64; 2]) -> f64 {
         let [i, j] = self.cell([x, sigma]);
         let mut best = f64::INFINITY;
@@ -249,7 +250,7 @@ fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();
     let speed_mps = planner.v_max_mps(number, target_m).unwrap();
     let pitch_m = speed_mps * planner.modes()[number].mode.turn.period_s();
-    // The ends are left out, because not all heads have passed there.
+    // The dive's ends are left out, because not all heads have passed there.
     let from_m = pitch_m + 6.0;
     let to_m = from_m + pitch_m;
     let samples = samples(&planner, number, speed_mps, to_m + pitch_m + 6.0, way);

@@ -18,7 +18,7 @@ fn simulation(scene: &Scene) -> Simulation {
     headrace_replay::simulation(scene, false).unwrap()
 }
 
-/// True chainage at each second.
+/// True chainage of the vehicle at each second of the dive.
 fn way(scene: &Scene) -> Vec<f64> {
     let mut simulation = simulation(scene);
     while simulation.next_message().is_some() {}
@@ -64,7 +64,7 @@ fn pilot_keeps_to_the_advised_speed_within_tolerance() {
     let way = way(&scene);
     let report = truth::dive(&scene).report;
     let told = &report.advice;
-    // The vehicle is under way in these seconds.
+    // In these seconds of the dive, the vehicle is moving steadily.
     for (second, pair) in way.windows(2).enumerate().skip(40).take(60) {
         let speed_mps = pair[1] - pair[0];
         let about = told.iter().filter(|entry| (entry.at_s - second as f64).abs() < 12.0);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages};
 use serde_json::Value;
 
-/// Messages of each source: time and bytes.
+/// Messages that each source sends: time and bytes.
 type Lines = BTreeMap<String, Vec<(u64, Vec<u8>)>>;
 
 fn folder() -> Folder {
@@ -14,7 +14,7 @@ fn folder() -> Folder {
     folder
 }
 
-/// Messages of each source in the short dive with these effects.
+/// Messages that each source sends in the short dive with these simulator effects.
 fn lines(folder: &Folder, effects: &str, further: &[&str]) -> Lines {
     folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));
     let arguments = [&["simulate", "scene.toml", "-o", "dive.mcap"], further].concat();
@@ -97,7 +97,7 @@ fn truth_output_does_not_change_the_log() {
     let column = |name: &str| columns.iter().position(|column| *column == name).unwrap();
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     assert!(rows.iter().all(|row| row.len() == columns.len()));
-    // Every ping of the log has a row.
+    // Every ping in the log has a row in the table of the ground truth.
     let pings = rows.iter().filter(|row| row[column("source")] == "sonar_0").count();
     assert_eq!(pings, plain["/raw/sonar_0"].len());
     let number = |row: &Vec<&str>, name| row[column(name)].parse::<f64>().unwrap();
@@ -188,12 +188,12 @@ fn explain_worth_shows_which_effects_change_the_result() {
     assert!(lost["is_free"] == false && lost["hole_m"]["mean"].as_f64().unwrap() < -0.02, "{lost}");
     let spared = worth["spared"]["effects"].as_array().unwrap();
     assert!(spared.contains(&"imu_noise".into()) && !spared.contains(&"missing_returns".into()), "{worth}");
-    // A single seed gives no interval.
+    // With a single seed, the report can't state a confidence interval.
     let one = folder.headrace(&["simulate", "scene.toml", "--explain=worth", "--seeds", "1"]);
     assert!(one.code == Some(2) && one.stderr.contains("seeds"), "{}", one.stderr);
 }
 
-/// Checks that the program exits with code 2 and prints these words.
+/// Checks that the simulation of a scene exits with code 2 and prints these words.
 #[track_caller]
 fn refused(scene: &str, words: &[&str]) {
     let folder = folder();
@@ -304,7 +304,7 @@ fn water_temperature_corrects_a_wrong_speed_of_sound() {
     assert!((1447.0..1449.0).contains(&least_mps) && most_mps < 1449.0, "{least_mps} to {most_mps}");
 }
 
-/// Whether this effect alone removes or displaces each ping of a head.
+/// For each ping of a head: whether this effect alone removes or displaces its return.
 fn touched(effect: &str) -> Vec<bool> {
     let ranges = |effects: &str| -> Vec<Option<f64>> {
         let scene = format!("{SCENE}\n[effects]\n{effects}\n");
