@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Interval {
     /// Lower bound.
     pub low: f64,
-    /// The figure itself.
+    /// The figure, between its bounds.
     pub middle: f64,
     /// Upper bound.
     pub high: f64,
@@ -164,12 +164,12 @@ impl Point {
     }
 }
 
-/// A setting that isn't measured.
+/// A setting without a measurement.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeftOut {
-    /// The setting.
+    /// The setting that was not measured.
     pub what: String,
-    /// The reason.
+    /// The reason for which the setting was not measured.
     pub why: String,
 }
 
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn spreads_match_published_tables() {
+    fn confidence_intervals_match_published_tables() {
         let values = [4.0, 1.0, 3.0, 2.0, 5.0];
         assert_eq!(Interval::quartiles(&values), Some(Interval { low: 2.0, middle: 3.0, high: 4.0 }));
         // The mean is 3 and the variance 2.5; t for four degrees of freedom is 2.776.

@@ -27,7 +27,7 @@ pub(crate) fn setting(point: &Point) -> String {
     if point.value.is_empty() { point.knob.clone() } else { format!("{} {}", point.knob, point.value) }
 }
 
-/// A setting with its error and cost.
+/// A setting as text, with its error and cost.
 fn whole(trade: &Trade, point: &Point) -> String {
     let unit = point.errors.first().map_or("", |error| error.unit.as_str());
     format!(

@@ -61,16 +61,16 @@ pub(crate) struct SignedRank {
     pub method: Method,
 }
 
-/// A reason why the test can't be made.
+/// A reason why the signed-rank test can't be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum WilcoxonError {
     /// Two lists differ in length.
     #[error("pairs need lists of equal length; these have {left} and {right}")]
     Lengths {
-        /// Length of the first.
+        /// Length of the first list.
         left: usize,
-        /// Length of the second.
+        /// Length of the second list.
         right: usize,
     },
     /// A difference isn't a finite number.

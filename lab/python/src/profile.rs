@@ -12,8 +12,8 @@ use crate::errors::Failure;
 use crate::spacing::Turn;
 use crate::vehicle;
 
-/// Number of soundings of a ring per step. With this number the largest step is found for any phase of the pings within
-/// the turn.
+/// Number of computed ranges per step of the head. With this number the largest step is found for any phase of the
+/// pings within the turn.
 const PER_STEP: u32 = 10;
 
 /// A tunnel's design profile: a closed cross-section in y (left) and z (up from the floor's centre), m.

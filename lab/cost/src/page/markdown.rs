@@ -1,4 +1,4 @@
-//! The two pages in Markdown: advice for a survey, and how it was measured.
+//! The two pages in Markdown: advice for a survey, and the method of measurement.
 
 use super::Results;
 use crate::point::{Given, Trade};

@@ -20,16 +20,16 @@ use headrace_oracle::dive::{JudgedDive, JudgedSection, Recorded};
 use headrace_oracle::second;
 use headrace_oracle::timed;
 
-/// Tolerances, m; 0.01 is a fiftieth of the target.
+/// Compared tolerances of the hole search, m; 0.01 is a fiftieth of the target.
 const TOLERANCES_M: [f64; 6] = [1e-4, 1e-3, 0.01, 0.05, 0.2, 1.0];
 const QUICK_TOLERANCES_M: [f64; 2] = [0.05, 0.2];
-/// Edge lengths of cells, m.
+/// Edge lengths of the grid cells for the cell-counting method, m.
 const CELLS_M: [f64; 3] = [0.5, 0.1, 0.02];
 const QUICK_CELLS_M: [f64; 1] = [0.1];
-/// Lengths of sections, m, besides the shipped one.
+/// Section lengths compared with the default length, m.
 const SECTIONS_M: [f64; 2] = [0.05, 1.0];
 const QUICK_SECTIONS_M: [f64; 1] = [1.0];
-/// Length of a dive's judged range, away from the dive's ends, m: quick, full.
+/// Length of the evaluated part of a dive, without its ends, m: in a quick and in a full measurement.
 const JUDGED_M: [f64; 2] = [4.0, 16.0];
 /// Length of tunnel beyond the end of a dive, m. A shorter tunnel keeps grids of fine cells small.
 const BEYOND_M: f64 = 30.0;
@@ -38,7 +38,8 @@ const NS: f64 = 1e9;
 /// Speed of all scenes, m/s.
 const SPEED_MPS: f64 = 0.1;
 
-/// Target of all scenes, m. A tenth of the target decides, and a tenth of that tenth counts as no difference.
+/// Target of all scenes, m. An error of a tenth of the target can change a decision; a hundredth counts as no
+/// difference.
 const TARGET_M: f64 = 0.5;
 const DECIDES_M: f64 = TARGET_M / 10.0;
 const NOTHING_M: f64 = DECIDES_M / 10.0;
@@ -49,24 +50,24 @@ enum Setting {
     Exact,
     Tolerance(f64),
     Section(f64),
-    /// T_max of Eq. 16 for the driven speed.
+    /// T_max of the paper's Eq. 16 for the driven speed.
     Planned,
-    /// The largest diagonal of a section's samples.
+    /// The largest diagonal of the sample lattice in a section.
     Lattice,
     Cells(f64),
 }
 
-/// A scene to dive.
+/// A scene whose dives are simulated and measured.
 struct Case {
     name: &'static str,
     /// Text of the scene. The length of its only leg is a placeholder.
     text: String,
 }
 
-/// Effects of the field on four heads.
+/// Simulated field effects, for a vehicle with four heads.
 ///
-/// The field scene of VITA 1 has these effects on one head. Here the pilot sways less: with more sway, every section
-/// would miss the target of half a metre.
+/// The shipped field scene of VITA 1 has the same effects with one head. Here the pilot sways less, since with that
+/// scene's sway every section would miss the target of half a metre.
 const FIELD: &str = "motion_within_turn = {}\nocclusion = {}\n\
     pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 2, period_s = 40 }\n\
     imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
@@ -321,7 +322,7 @@ impl Setting {
     }
 }
 
-/// Name of the figure that is a time and not an error.
+/// Name of the only figure that is a CPU time, not an error.
 const SEARCH: &str = "search or count alone";
 
 /// Judges each section by the spacing T that `t_m` returns for it.
@@ -335,7 +336,7 @@ fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) ->
     verdicts::inner(dive).map(judged).collect()
 }
 
-/// T_max of Eq. 16 at the driven speed for the configured heads, m.
+/// T_max of the paper's Eq. 16 at the driven speed for the configured heads, m.
 fn planned_t_m(vehicle: &VehicleConfig) -> Result<f64, CostError> {
     let failed = |why: &str| CostError::Figure { what: "T of the plan".to_owned(), why: why.to_owned() };
     let planner = Planner::new(vehicle.inspection().map_err(|why| failed(&why))?)?;
@@ -368,7 +369,7 @@ fn search(dive: &Loop, tolerance_m: f64) {
     }
 }
 
-/// Finds a figure of a point by its name.
+/// Finds a figure among the errors of a measured point, by its name.
 fn figure(point: &Point, name: &str) -> f64 {
     let found = point.errors.iter().find(|error| error.name.starts_with(name));
     found.map_or(f64::NAN, |error| error.interval.middle)

@@ -10,9 +10,9 @@ use headrace_geometry::tunnel::{Profile, Yz};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Averaging time of the speed, s.
+/// Time over which the speed is averaged from the cable counter's readings, s.
 const SPEED_OVER_S: f64 = 1.0;
-/// Age above which a reading is ignored, s.
+/// Age above which the cable counter's last reading is ignored, s.
 const STALE_S: f64 = 2.0;
 
 /// The chainage of a cable reading, m; `None` for any other reading.
