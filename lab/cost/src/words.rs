@@ -91,7 +91,7 @@ pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
             let is_named = *method == default.method || *method == better.knob;
             let method = if is_named { String::new() } else { format!("{method}, ") };
             lines.push(format!(
-                "Cheaper with no more error in \"{scene}\": {method}{}. Shipped: {}.",
+                "In \"{scene}\", {method}{} costs less than the shipped {}, without more error.",
                 whole(trade, better),
                 whole(trade, default)
             ));

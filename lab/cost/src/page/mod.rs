@@ -31,9 +31,11 @@ impl Bars {
     /// Describes a cost and its bounds for the page method.md.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Quartiles => "median of nine rounds measured in turns, with quartiles",
+            Self::Quartiles => {
+                "median over nine rounds, each of which measures every setting once. Its bounds are the quartiles"
+            }
             Self::Median => {
-                "median of rounds measured in turns (nine, or three with `--quick`), with its 95 % interval by the sign test"
+                "median over nine rounds (three with `--quick`), each of which measures every setting once. Its bounds are the 95 % interval by the sign test"
             }
         }
     }

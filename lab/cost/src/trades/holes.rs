@@ -386,7 +386,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
         let search = figure(exact, SEARCH);
         Some(format!(
             "Scene {scene}: the search takes {} of {} ns per return, so a tolerance can save at most {} %. A tolerance of 0.05 m saves {} ns and \
-             leaves {} m in 100 without a verdict, instead of {}.",
+             leaves {} of 100 m without a verdict, instead of {}.",
             number(search),
             number(exact.cost.middle),
             number(100.0 * search / exact.cost.middle),
@@ -410,7 +410,7 @@ fn advice(points: &[Point]) -> String {
     let planned = find(points, "drop-outs", "of the plan", None);
     format!(
         "Keep the exact search. It takes {} of {} ns per return and is within {} m of D_true in an ideal dive. A grid of 0.1 m cells is {} m \
-         off. In the scene drop-outs, the grid wrongly passes {} m in 100, and the spacing that the plan predicts wrongly passes {}.",
+         off. In the scene drop-outs, of every 100 m the grid wrongly passes {} m, and a verdict by the planned spacing T {} m.",
         number(figure(exact, SEARCH)),
         number(exact.cost.middle),
         number(exact.error()),
