@@ -23,7 +23,7 @@ use crate::place::DiveLog;
 
 /// Name of the file that lists a dive's files.
 const WHOLE: &str = "whole.json";
-/// Folder for unfinished dives.
+/// Folder for dives whose files are still being written.
 const SCRATCH: &str = "unfinished";
 /// Folder for the digests of logs.
 const KNOWN: &str = "known";
@@ -70,7 +70,7 @@ impl Cache {
         &self.folder
     }
 
-    /// Folder for unfinished dives.
+    /// Folder for dives whose files are still being written.
     pub fn scratch(&self) -> PathBuf {
         self.folder.join(SCRATCH)
     }

@@ -20,7 +20,7 @@ use crate::error::Error;
 
 /// Maximum number of rows drawn. A line below states the number of further rows.
 const MOST_ROWS: usize = 60;
-/// Widest label, pixels.
+/// Maximum width of a label, pixels.
 const LABEL_PX: f64 = 260.0;
 const WIDTH_PX: u32 = 1000;
 /// Colours of verdicts, as on the page.

@@ -21,7 +21,7 @@ const MOST_PARTS: u32 = 999;
 /// A folder of logs, on this machine or in an object store.
 #[derive(Debug, Clone)]
 pub struct Place {
-    /// URL of the place, ending in `/`.
+    /// URL of the folder or bucket, ending in `/`.
     url: Url,
     store: Arc<dyn ObjectStore>,
     prefix: StorePath,
@@ -94,7 +94,7 @@ impl Place {
         Ok(Self { url, store: Arc::from(store), prefix, folder })
     }
 
-    /// URL of the place.
+    /// URL of the folder or bucket.
     pub fn url(&self) -> &Url {
         &self.url
     }

@@ -28,7 +28,7 @@ use crate::place::{DiveLog, Place};
 /// Description of a replay table. It can be sent to another process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Replayed {
-    /// URL of the place.
+    /// URL of the folder or bucket with the logs.
     pub place: String,
     /// The dives, one per partition.
     pub dives: Vec<DiveLog>,

@@ -26,7 +26,7 @@ pub struct RunRow {
     pub mode: &'static str,
     /// Number of heads.
     pub heads: u8,
-    /// Whether the heads are in sector-offset mode instead of phase-shift mode.
+    /// Whether the heads are in the sector-offset layout instead of the phase-shift layout.
     pub sectors: bool,
     /// T_x, m.
     pub t_x: Pair,
@@ -69,7 +69,7 @@ impl Pair {
 pub struct SignedRankRow {
     /// The compared quantity.
     pub what: &'static str,
-    /// Whether the test is for sector-offset mode instead of phase-shift mode.
+    /// Whether the test is for the sector-offset layout instead of the phase-shift layout.
     pub sectors: bool,
     /// Two-sided p of the predictions against the paper's experiments; `None` if all differences are zero.
     pub p_paper: Option<f64>,

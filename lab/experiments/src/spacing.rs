@@ -17,8 +17,8 @@ const STEP_SHARE: f64 = 0.25;
 pub(crate) struct Spacing {
     /// T_x: mean distance along the tunnel from pass to pass.
     ///
-    /// In phase-shift mode, passes are counted on lines along the wall. In sector-offset mode, each turning point of a
-    /// head at one end of its sector counts as a pass.
+    /// In the phase-shift layout, passes are counted on lines along the wall. In the sector-offset layout, each turning
+    /// point of a head at one end of its sector counts as a pass.
     pub t_x_m: f64,
     /// T_y: distance across the tunnel from ping to ping, in the cross-section.
     pub t_y: Spread,

@@ -22,7 +22,7 @@ pub(crate) enum Zeros {
     Pratt,
 }
 
-/// Options of the test.
+/// Options of the signed-rank test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Options {
     /// Treatment of zeros.
@@ -31,7 +31,7 @@ pub(crate) struct Options {
     pub continuity: bool,
 }
 
-/// Distribution used for p.
+/// Distribution from which p is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Method {
     /// The exact distribution of W+ over all choices of signs.
@@ -57,7 +57,7 @@ pub(crate) struct SignedRank {
     pub p_greater: f64,
     /// Probability that W+ is at most as large.
     pub p_less: f64,
-    /// Distribution used.
+    /// Distribution from which p was computed.
     pub method: Method,
 }
 

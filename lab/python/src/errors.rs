@@ -57,7 +57,7 @@ pub(crate) enum Failure {
     Vehicle {
         /// The vehicle file.
         file: String,
-        /// The inconsistency.
+        /// The inconsistency in the settings.
         why: String,
     },
     /// A dive can't be replayed.

@@ -126,8 +126,8 @@ impl Profile {
         self.profile.clock(arc_m)
     }
 
-    /// T_y at rest of a head at (y_m, z_m): the least, mean and largest straight distance between neighbouring samples of one
-    /// turn, m. The general case of the paper's Eq. 5, 6 and 10, by ray casting.
+    /// T_y at rest of a head at (y_m, z_m): the least, mean and largest straight distance between neighbouring samples
+    /// of one turn, m. The general case of the paper's Eq. 5, 6 and 10, by ray casting.
     ///
     /// Raises SamplingError for a head outside the profile.
     fn t_y_at_rest_m(&self, y_m: f64, z_m: f64, turn: &Turn) -> Result<(f64, f64, f64), Failure> {

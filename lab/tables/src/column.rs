@@ -54,7 +54,7 @@ impl<R> Get<R> {
 /// A column: its name with the unit, its description, and the function that takes its value.
 pub(crate) struct Column<R>(pub(crate) &'static str, pub(crate) &'static str, pub(crate) Get<R>);
 
-/// A table with rows of type `R`.
+/// A table whose rows are made from values of type `R`.
 pub(crate) struct Table<R> {
     pub(crate) name: &'static str,
     /// Description of one row of the table, for the documentation.

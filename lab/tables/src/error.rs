@@ -45,7 +45,7 @@ pub enum Error {
         None => "is attached to this log".to_owned(),
     })]
     NoVehicle {
-        /// The log.
+        /// Path of the log.
         log: PathBuf,
         /// The first loss of data in the log, which may be the cause.
         loss: Option<String>,
@@ -62,13 +62,13 @@ pub enum Error {
     /// The replay was stopped before the log's end.
     #[error("replaying {}: stopped before its end", log.display())]
     Stopped {
-        /// The log.
+        /// Path of the log.
         log: PathBuf,
     },
     /// Smoothing was requested for a vehicle without a navigation filter.
     #[error("replaying {}: smooth needs [navigation] way = \"filter\"; the vehicle file has way = \"direct\"", log.display())]
     NoFilter {
-        /// The log.
+        /// Path of the log.
         log: PathBuf,
     },
     /// Smoothing failed.

@@ -1,6 +1,7 @@
 //! Holes: the cost of finding the largest hole of a section exactly.
 //!
-//! The exact search is compared with a search with tolerances, with the lattice's T, and with counts of empty cells.
+//! The exact search is compared with a search with tolerances, with T of the sample lattice, and with counts of empty
+//! cells.
 
 use headrace_coverage::HoleFinder;
 use headrace_monitor::run::Loop;
@@ -91,7 +92,7 @@ fn cases() -> Result<[Case; 3], CostError> {
     ])
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -137,7 +138,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     inputs.effort.pick(Some(quick), None).into_iter().collect()
 }
 
-/// A case's dives, one per seed.
+/// The dives of a scene, one per seed.
 struct Dives(Vec<(Scene, Recorded)>);
 
 impl Dives {

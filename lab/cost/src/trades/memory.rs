@@ -24,7 +24,7 @@ const PACKED_M: u32 = 160;
 /// Bytes of a sample before packing: its chainage, arc length, step, visit and head number.
 const PLAIN_BYTES: usize = size_of::<WallSample>();
 
-/// Makes the table.
+/// Measures the costs of determinism and memory, as a table.
 ///
 /// Errors: see [`CostError`].
 pub fn tabulate(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Given, CostError> {

@@ -88,7 +88,7 @@ struct Dived {
     by_cable: JudgedDive,
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -327,7 +327,7 @@ fn points(inputs: &Inputs<'_>, prepared: &[Prepared]) -> Result<Vec<Point>, Cost
     Ok(points)
 }
 
-/// Results of navigation itself in one dive.
+/// Figures for the accuracy of navigation in one dive.
 #[derive(Debug, Clone, Copy)]
 struct Figures {
     turn_m: Option<f64>,

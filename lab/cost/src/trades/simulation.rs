@@ -51,7 +51,7 @@ struct Figures {
     features_hit: Vec<u16>,
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {

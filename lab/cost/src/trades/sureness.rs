@@ -33,7 +33,7 @@ const HURRY: f64 = 1.2;
 /// Range of times between two passes for which the standard deviation is stated, s. The range covers all passes.
 const TIMES_S: [f64; 2] = [0.001, 1000.0];
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {

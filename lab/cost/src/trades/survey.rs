@@ -61,7 +61,7 @@ struct Way<'a> {
     drift_m: f64,
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -368,7 +368,7 @@ pub fn planner(
     Ok(Planner::new(inspection)?.with_errors(errors))
 }
 
-/// Dives at the planned speed.
+/// Settings of simulated dives at the planned speed.
 struct Dives<'a> {
     way: &'a Way<'a>,
     mode: &'static str,

@@ -1,4 +1,4 @@
-//! Draws Figures 6 and 8: sampling patterns of heads in phase-shift mode and in sector-offset mode.
+//! Draws Figures 6 and 8: sampling patterns of heads in the phase-shift layout and in the sector-offset layout.
 
 use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart};

@@ -100,7 +100,7 @@ fn figure_12_passes_are_evenly_spaced_only_if_head_phases_are_aligned() {
 }
 
 #[test]
-fn figure_13_shows_side_wall_gaps_in_phase_shift_mode_and_unseen_strips_in_sector_mode() {
+fn figure_13_shows_side_wall_gaps_in_phase_shift_layout_and_unseen_strips_in_sector_layout() {
     let (figure, svg) = drawn(&[AT_GAPS[1], AT_GAPS[3]]);
     let [phase, sector] = figure.panels.as_slice() else { panic!("two panels") };
     let gap = phase.widest.unwrap();

@@ -32,7 +32,7 @@ pub(crate) struct Way {
     pub points: Vec<[f64; 2]>,
 }
 
-/// A stretch of the tunnel.
+/// The stretch of tunnel that a figure shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Window {
     from_m: f64,

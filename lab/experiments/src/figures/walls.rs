@@ -76,7 +76,7 @@ pub(crate) struct Panel {
     pub cells: [u32; 2],
     /// Unsigned distance of each cell's centre from the surface, m. The cells around the wall are consecutive.
     pub distances_m: Vec<f64>,
-    /// Mean of the distances, m.
+    /// Mean distance of the cells from the surface, m.
     pub mean_m: f64,
     /// The longest gap between passes along the tunnel, among lines with at least two passes.
     pub widest: Option<Gap>,
@@ -121,7 +121,7 @@ pub(crate) fn walls(
     let last = math::floor_to_i64(SCALE_SHARE * all.len() as f64);
     let most_m = all.get(crate::index(last)).copied().unwrap_or_default();
     let profile = headrace_geometry::tunnel::shapes::ceran_blueprint()?;
-    // The scale ends at a whole centimetre.
+    // The colour scale ends at a whole centimetre.
     let most_m = (most_m * 100.0).ceil().max(1.0) / 100.0;
     Ok(Walls { profile, speed_mps: SPEED_MPS, dive_m: LENGTH_M, length_m: SHOWN_M, panels, most_m })
 }

@@ -39,7 +39,7 @@ impl Baselines {
     }
 }
 
-/// The largest distance between passes, m: T_x / s in phase-shift mode, 2 T_x / s in sector-offset mode.
+/// The largest distance between passes, m: T_x / s in the phase-shift layout, 2 T_x / s in the sector-offset layout.
 pub(super) fn t_x_m(turn: Turn, layout: HeadLayout, heads: u8, speed_mps: f64) -> Result<f64, PaperError> {
     let passes_per_turn = match layout {
         HeadLayout::PhaseShift => f64::from(heads),

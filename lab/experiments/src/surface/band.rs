@@ -60,7 +60,7 @@ impl Band {
         Self::assemble(cells, &SLOPE)
     }
 
-    /// Entry on the diagonal.
+    /// Entry of the matrix on its main diagonal.
     pub(super) fn diagonal(&self, row: usize) -> f64 {
         self.rows.get(row).map_or(0.0, |r| r[2])
     }

@@ -25,7 +25,7 @@ pub(crate) struct MeshIndex<'a> {
     members: Vec<u32>,
 }
 
-/// Maximum number of bins of an index.
+/// Maximum number of bins in which the triangles are sorted.
 const BINS_MAX: f64 = 4e6;
 
 impl MeshIndex<'_> {

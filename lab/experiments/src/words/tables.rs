@@ -51,7 +51,7 @@ fn show<Row>(text: &mut String, table: &Table<Row>, blocks: &[Block<'_, Row>]) {
     }
 }
 
-/// A note wrapped to the line length.
+/// Formats a note as lines of limited length.
 fn wrapped(note: &Note) -> Vec<String> {
     let mut lines = vec![format!("  {}  {}:", note.mark, note.kind.as_str())];
     for word in note.text.split(' ') {

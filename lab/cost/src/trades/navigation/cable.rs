@@ -71,7 +71,7 @@ impl Navigation for CableNavigation {
         }
         let [y_m, z_m] = self.middle;
         let position = Point3::new(chainage_m + self.speed_mps * age_s, y_m, z_m);
-        // Two independent roundings to the counter's quantum.
+        // The difference of two readings contains two independent roundings to the counter's quantum.
         let relative = Relative::along(self.resolution_m * math::sqrt(2.0 / 12.0));
         Ok(Fix {
             pose: Pose { position, attitude: Rot::identity() },
