@@ -226,7 +226,7 @@ fn broken_cache_entries_are_found_and_remade() {
     let all = files(cache.path());
     let below = |path: &Path| cache.path().join(headrace_tables::program_version()).join(path);
     let sections: Vec<&PathBuf> = all.keys().filter(|path| path.ends_with("sections.parquet")).collect();
-    // A changed bit, a truncated file, and a deleted file.
+    // Three kinds of damage: a changed bit, a truncated file, and a deleted file.
     let mut flipped = all[sections[0]].clone();
     let middle = flipped.len() / 2;
     flipped[middle] ^= 1;

@@ -23,15 +23,15 @@ pub struct Perimeter {
     pub nominal_m: f64,
     /// Perimeter measured in the paper.
     pub paper_m: f64,
-    /// By the paper's method: the skeleton of the echo image, with steps of 1 or sqrt 2 pixels.
+    /// Perimeter by the paper's method: the skeleton of the echo image, with steps of 1 or sqrt 2 pixels.
     pub skeleton_m: f64,
-    /// By the same skeleton, with lengths corrected for the staircase of pixels.
+    /// Perimeter by the same skeleton, with lengths corrected for the staircase of pixels.
     pub skeleton_smooth_m: f64,
-    /// By a polygon through the first return of each beam.
+    /// Perimeter of a polygon through the first return of each beam.
     pub first_returns_m: f64,
-    /// By a polygon through the mean ranges of each beam.
+    /// Perimeter of a polygon through the mean range of each beam.
     pub mean_ranges_m: f64,
-    /// By a polygon through the hits of ideal rays, without beam width.
+    /// Perimeter of a polygon through the hits of ideal rays, without beam width.
     pub rays_m: f64,
 }
 

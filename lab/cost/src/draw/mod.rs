@@ -41,7 +41,7 @@ fn whole(px: f64) -> u32 {
     u32::try_from(headrace_geometry::math::floor_to_i64(px) + 1).unwrap_or(0)
 }
 
-/// Explains the marks in a line below the title.
+/// Draws the legend: a line below the title that explains the marks.
 fn legend(canvas: &Canvas, trade: &Trade) {
     let y = 70.0;
     let mut x = 14.0;

@@ -63,7 +63,7 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// Position of a point. Errors below [`CLEAR`] times the oracle's error are drawn at that value.
+    /// Position of a point in the chart. Errors below [`CLEAR`] times the oracle's error are drawn at that limit.
     fn place(&self, point: &Point) -> [f64; 2] {
         [self.shown(point.error()), point.cost.middle]
     }

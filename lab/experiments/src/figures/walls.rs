@@ -80,9 +80,9 @@ pub(crate) struct Panel {
     pub mean_m: f64,
     /// The longest gap between passes along the tunnel, among lines with at least two passes.
     pub widest: Option<Gap>,
-    /// Start and end of strips of wall in which some gap between passes exceeds 1.5 T_x / s, m.
+    /// Arc lengths of the start and end of each strip of wall in which some gap between passes exceeds 1.5 T_x / s, m.
     pub wide_m: Vec<[f64; 2]>,
-    /// Start and end of strips of wall without passes, m.
+    /// Arc lengths of the start and end of each strip of wall without passes, m.
     pub unseen_m: Vec<[f64; 2]>,
 }
 
@@ -91,7 +91,7 @@ pub(crate) struct Panel {
 pub(crate) struct Gap {
     /// Arc length of the line, m.
     pub arc_m: f64,
-    /// Start and end of the gap, from the picture's start, m.
+    /// Start and end of the gap along the tunnel, from the picture's start, m.
     pub x_m: [f64; 2],
 }
 
