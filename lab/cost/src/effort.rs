@@ -11,7 +11,7 @@ pub enum Effort {
 }
 
 impl Effort {
-    /// Returns the value for this amount of measurement.
+    /// Returns `quick` for a quick check, and `full` for the full measurement.
     pub fn pick<T>(self, quick: T, full: T) -> T {
         match self {
             Self::Quick => quick,

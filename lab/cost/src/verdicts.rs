@@ -20,7 +20,7 @@ pub struct Judged {
     pub hole_m: Option<f64>,
     /// Whether the section is within the target; `None` if undecided.
     pub passes: Option<bool>,
-    /// D_true, m.
+    /// D_true: the true diameter of the section's largest hole, m.
     pub true_hole_m: f64,
 }
 

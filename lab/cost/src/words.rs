@@ -27,7 +27,7 @@ pub(crate) fn setting(point: &Point) -> String {
     if point.value.is_empty() { point.knob.clone() } else { format!("{} {}", point.knob, point.value) }
 }
 
-/// A setting with its error and cost.
+/// A setting as text, with its error and cost.
 fn whole(trade: &Trade, point: &Point) -> String {
     let unit = point.errors.first().map_or("", |error| error.unit.as_str());
     format!(
@@ -91,7 +91,7 @@ pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
             let is_named = *method == default.method || *method == better.knob;
             let method = if is_named { String::new() } else { format!("{method}, ") };
             lines.push(format!(
-                "Cheaper with no more error in \"{scene}\": {method}{}. Shipped: {}.",
+                "In \"{scene}\", {method}{} costs less than the shipped {}, without more error.",
                 whole(trade, better),
                 whole(trade, default)
             ));

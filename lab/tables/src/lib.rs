@@ -187,7 +187,7 @@ pub fn described() -> String {
     page
 }
 
-/// Formats the first bytes as hexadecimal digits.
+/// Formats the first bytes of a digest as hexadecimal digits.
 #[expect(clippy::format_collect, reason = "a few bytes")]
 fn hex(bytes: &[u8], most: usize) -> String {
     bytes.iter().take(most).map(|byte| format!("{byte:02x}")).collect()

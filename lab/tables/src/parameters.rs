@@ -57,7 +57,7 @@ impl Parameters {
         crate::hex(&hasher.finalize(), 8)
     }
 
-    /// Changes a vehicle's settings to the parameters.
+    /// Overrides a vehicle's settings by these parameters.
     ///
     /// Errors: a value is out of its range.
     pub(crate) fn apply(&self, vehicle: &mut VehicleConfig) -> Result<(), Error> {

@@ -17,7 +17,7 @@ pub(super) struct Placed {
     pub(super) led_from: Option<Px>,
 }
 
-/// Areas of a sheet that are already occupied.
+/// Areas of a drawing that markers and labels already occupy.
 #[derive(Default)]
 pub(super) struct Taken(Vec<Frame>);
 
@@ -43,7 +43,7 @@ impl Taken {
                 let by_px = match side {
                     Side::Right => APART_PX,
                     Side::Left => -APART_PX,
-                    // A label in the middle is directly above or below its marker.
+                    // A horizontally centred label can only be directly above or below its marker.
                     Side::Middle if step == 0.0 => continue,
                     Side::Middle => 0.0,
                 };

@@ -9,7 +9,7 @@ use super::drift::{Rig, floor_m, height_m};
 use super::printed::{Digits, Interval, Line, lines};
 use super::{FITTING_SPEED_MPS, PaperError, STATED_SPEED_MPS};
 
-/// Position of a head relative to the corner of floor and wall.
+/// Position of a head relative to the corner between floor and wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     /// Height above the floor, m.

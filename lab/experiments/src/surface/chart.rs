@@ -56,7 +56,7 @@ pub struct ChartError {
     why: String,
 }
 
-/// The interpolated wall.
+/// The wall interpolated between samples.
 pub(crate) struct Chart {
     triangles: DelaunayTriangulation<Vertex>,
     perimeter_m: f64,
@@ -65,7 +65,7 @@ pub(crate) struct Chart {
 /// Differences of the interpolated wall from the true wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ChartSpread {
-    /// Unsigned differences along the ray from the reference point.
+    /// Absolute differences, measured along rays from the reference point.
     pub spread: Spread,
     /// Number of positions outside the samples' hull, which have no interpolated value.
     pub uncovered: usize,

@@ -1,4 +1,4 @@
-//! `sections`, `holes` and `flags`: the results of the sections of the coverage extent.
+//! The tables `sections`, `holes` and `flags`: results for each section of the coverage extent.
 
 use headrace_coverage::{Evidence, Unsure};
 use headrace_monitor::section_row::SectionRow;

@@ -83,7 +83,8 @@ impl Hearing {
         Self { sensors: self.sensors.clone(), readings, duration_s: self.duration_s.min(part_s) }
     }
 
-    /// Runs a navigation as the loop does: requests a fix before each ping and passes the fix to `take`.
+    /// Runs a navigation method as the live loop does: requests a position fix before each ping and passes it to
+    /// `take`.
     pub(super) fn run(
         &self,
         navigation: &mut dyn Navigation,
