@@ -1,8 +1,8 @@
 //! Errors of a judging method, in the quantities that decide: the hole, and metres falsely passed, falsely failed, or
 //! not judged.
 
-use headrace_coverage::Verdict;
 use crate::point::{Error, Interval, quantile};
+use headrace_coverage::Verdict;
 use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
 /// Length that is left out at each end of a dive, in addition to a length equal to the target, m.

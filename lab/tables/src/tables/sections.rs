@@ -38,7 +38,11 @@ pub(crate) fn sections() -> Table<SectionRow> {
             Column(
                 "cannot_say",
                 "Reason for `cannot_say`",
-                Get::Text(|row| row.cannot_say.filter(|why| *why != Unsure::NotInspected).map(|why| why.as_str().to_owned())),
+                Get::Text(|row| {
+                    row.cannot_say
+                        .filter(|why| *why != Unsure::NotInspected)
+                        .map(|why| why.as_str().to_owned())
+                }),
             ),
             Column("cause", "Main cause, if the verdict is `fail`", Get::Text(cause)),
             Column("causes", "All causes, the main one first, separated by commas", Get::Text(causes)),
