@@ -49,7 +49,7 @@ pub struct Leg {
     creeping: [f64; 2],
     /// Factors for the process noise of gyro and accelerometer biases.
     unrest: [f64; 2],
-    /// The cable's slack.
+    /// Standard deviation, m, and time constant, s, of the cable's slack.
     slack: [f64; 2],
 }
 

@@ -254,7 +254,7 @@ pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarU
     })
 }
 
-/// Measures that one component of the velocity is zero (ZUPT).
+/// Returns the measurement of zero velocity (ZUPT), one scalar for each axis.
 pub fn rest(state: &State, sd_mps: f64) -> [ScalarUpdate; 3] {
     let moved = [state.velocity_mps.x(), state.velocity_mps.y(), state.velocity_mps.z()];
     core::array::from_fn(|k| {

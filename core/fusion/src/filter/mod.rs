@@ -252,7 +252,7 @@ impl FilterNavigation {
         debug_assert!(sd.is_valid(), "standard deviations of a sound estimate are numbers: {sd:?}");
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
-        // After a restart, errors of new soundings are independent of errors of earlier soundings.
+        // Until two clones exist, errors of new soundings are independent of errors of earlier soundings.
         self.revisit = sd.independent();
         let differs = Relative::along(self.running.cable.differs_m());
         let relative = relative.unwrap_or(self.revisit).weighted(1.0, &differs, 1.0);

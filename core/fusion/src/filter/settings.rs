@@ -28,7 +28,7 @@ impl GaussMarkov {
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
     }
 
-    /// Variance that a process with a single lag gains per second.
+    /// Variance that white noise adds to a process with a single lag per second.
     pub fn density(&self) -> f64 {
         2.0 * self.reach * self.reach / self.time_s
     }
@@ -48,8 +48,8 @@ pub struct Settings {
     pub rate_noise: f64,
     /// White noise of the accelerometers, m/s^2/sqrt(Hz).
     pub force_noise: f64,
-    /// White noise without gyro or accelerometer data: the vehicle's own turning and acceleration, in the same
-    /// units.
+    /// White noise assumed without gyro or accelerometer data: the vehicle's own turning, rad/s/sqrt(Hz), and
+    /// acceleration, m/s^2/sqrt(Hz).
     pub blind_rate_noise: f64,
     /// See `blind_rate_noise`.
     pub blind_force_noise: f64,
@@ -144,10 +144,10 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Not configurable: two thirds of 0.3 m, which was the distance between bumps in field dives
+            // Length of a bump, not configurable: two thirds of the distance of 0.3 m between bumps in field dives
             // (docs/why/field.md).
             bump_m: 0.2,
-            // Not configurable. It is about the vehicle's distance during half a turn of a head.
+            // Not configurable: about the distance that the vehicle travels during half a turn of a head.
             seen_again_m: 0.05,
             echo_beam_rad: 25.0 * DEGREE,
             range_scale_sd: 0.03,
@@ -181,7 +181,8 @@ impl Settings {
         }
     }
 
-    /// Measurement variance of a kind of sensor, in its unit squared. Innovation variances are compared with it.
+    /// Measurement variance of a kind of sensor, in the square of the measurement's unit. Innovation variances are
+    /// compared with it.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {
             SensorKind::Head => self.return_sd_m,
