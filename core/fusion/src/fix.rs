@@ -39,7 +39,7 @@ pub enum NoFix {
 }
 
 impl NoFix {
-    /// All variants.
+    /// All parts of a fix that can be missing.
     pub const ALL: [Self; 3] = [Self::Heading, Self::Chainage, Self::Section];
 
     /// Name of the missing part in reports and logs.
