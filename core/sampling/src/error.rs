@@ -73,7 +73,7 @@ pub enum SamplingError {
     /// A planning question has no target, speed or time.
     #[error("no question: give a target, a speed or a time")]
     NothingAsked,
-    /// Heads that are apart along the hull have no phase for a stationary vehicle.
+    /// Heads that are apart along the hull cannot be phased for a stationary vehicle.
     #[error(
         "heads {apart_m} m apart along the hull have no phase at {speed_mps} m/s; it takes a speed above zero"
     )]

@@ -68,19 +68,19 @@ impl Turn {
     }
 }
 
-/// Source of the turn period of a mode.
+/// Origin of the stated turn period of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
-    /// Measured on this head at this range setting, from the vehicle file.
+    /// Period measured on this head at this range setting, from the vehicle file.
     Measured,
-    /// Taken from the manufacturer's table, at the table's range setting.
+    /// Period from the manufacturer's table, at the table's range setting.
     Table,
-    /// Estimated from another range setting.
+    /// Period estimated from the period at another range setting.
     Estimated,
 }
 
 impl Basis {
-    /// Name used in tables.
+    /// Name of the period's origin in tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -95,9 +95,9 @@ impl Basis {
 pub struct HeadMode {
     /// Name of the mode in vehicle files.
     pub name: &'static str,
-    /// Step and period.
+    /// Angular step and turn period.
     pub turn: Turn,
-    /// Source of the period.
+    /// Origin of the turn period.
     pub basis: Basis,
 }
 
@@ -112,7 +112,7 @@ pub struct HeadBody {
     pub behind_m: f64,
 }
 
-/// Properties of a head that its schedule requires.
+/// Properties of a head that are needed to schedule its rotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadSpec {
     /// Mounting on the vehicle.
@@ -138,12 +138,12 @@ impl HeadSpec {
     }
 }
 
-/// Program of a head for a dive: start angle, direction and sector. Angles in the sensor frame.
+/// Rotation program of a head for a dive: start angle, direction and sector, with angles in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadProgram {
     /// Angle of the first ping, radians.
     pub start_rad: f64,
-    /// Whether the first step is towards growing angles.
+    /// Whether the head's first step is towards growing angles.
     pub growing: bool,
     /// Least angle and size of the sector to sweep back and forth, radians; `None` for continuous rotation.
     pub sector: Option<(f64, f64)>,
@@ -154,7 +154,7 @@ pub struct HeadProgram {
 pub struct HeadMotion {
     /// Mounting on the vehicle.
     pub mount: Mount,
-    /// Current angle, in the sensor frame, radians.
+    /// Current angle of the head in the sensor frame, radians.
     pub angle_rad: f64,
     /// Rate of rotation, rad/s, positive where the angle grows.
     pub rate_radps: f64,
@@ -171,7 +171,7 @@ impl HeadMotion {
         rate_radps > 0.0 && rate_radps.is_finite() && step_rad > 0.0 && step_rad.is_finite()
     }
 
-    /// Time of a whole turn at this rate, seconds.
+    /// Time of a whole turn at the head's present rate, seconds.
     pub fn turn_period_s(&self) -> f64 {
         TAU / self.rate_radps.abs()
     }

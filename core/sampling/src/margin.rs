@@ -6,15 +6,15 @@
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation that requires no margin, m: about that of navigation without error estimates.
+/// Standard deviation of a hole's size that requires no margin, m: about that of navigation without error estimates.
 const NOTHING_M: f64 = 0.002;
 /// Minimum share of the distance between passes that remains after the margin.
 ///
 /// No speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;
-/// Maximum share of the target that the margin takes.
+/// Maximum share of the target that the margin for position errors takes.
 const MOST_SHARE: f64 = 0.2;
-/// Share of the time between heads that are apart along the hull. It counts towards the time between passes.
+/// Share of the travel time from the foremost to the rearmost head that counts towards the time between passes.
 ///
 /// Only some neighbouring passes are by such heads, and holes between these passes grow by less than the heads'
 /// separation. With this share, a hole's size D is within two of its standard deviations 93 % of the time, over the
@@ -83,17 +83,17 @@ pub struct RemainingTarget {
 }
 
 impl RemainingTarget {
-    /// Returns the remaining target at a speed, m; grows continuously with speed.
+    /// Returns the target minus the margin at a speed, m; grows continuously with speed.
     pub fn at_m(&self, speed_mps: f64) -> f64 {
         let time_s = error_time_s(1.0 / self.even_gap_s, self.apart_m, speed_mps, APART_SHARE);
-        // If no heads turn, the time is unknown.
+        // If no heads turn, the time between passes is unknown.
         let same = self.measured_s <= 0.0 || (time_s - self.measured_s).abs() <= f64::EPSILON * time_s;
         let growth = if same { 1.0 } else { math::exp(GROWTH * math::ln(time_s / self.measured_s)) };
         let error_m = self.pass_error_m * growth;
         self.target_m - position_margin_m(self.target_m, self.confidence_sd, error_m, self.t_y_m)
     }
 
-    /// Returns the remaining target at unlimited speed, m.
+    /// Returns the target minus the margin at unlimited speed, m.
     pub fn most_m(&self) -> f64 {
         self.at_m(f64::INFINITY)
     }
@@ -111,7 +111,7 @@ pub struct ExpectedErrors {
 impl ExpectedErrors {
     /// Returns the standard deviation of a hole's size after a time between passes, m.
     ///
-    /// The value is interpolated, and proportional to time beyond the last entry.
+    /// The value is interpolated between the entries, and proportional to time beyond the last entry.
     pub fn pass_error_m(&self, time_s: f64) -> f64 {
         let mut before = [0.0, 0.0];
         for &after in &self.by_time {
@@ -128,7 +128,7 @@ impl ExpectedErrors {
 /// A cause that lowers the speed below that of the ideal geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Margin {
-    /// No cause but the distance between turns.
+    /// No cause but the distance that the vehicle travels between two passes.
     Geometry,
     /// Wall that the vehicle hides from some of its heads, or that is outside their range limits.
     Hidden,
@@ -136,18 +136,18 @@ pub enum Margin {
     Phase,
     /// Beams that swing along the wall.
     Swing,
-    /// Uncertain position.
+    /// Uncertain position of the vehicle.
     Position,
     /// Lost returns.
     Losses,
 }
 
 impl Margin {
-    /// All causes in the order in which they are added.
+    /// All causes of lower speed, in the order in which their margins are added.
     pub const ALL: [Self; 6] =
         [Self::Geometry, Self::Hidden, Self::Phase, Self::Swing, Self::Position, Self::Losses];
 
-    /// Name used in reports and logs.
+    /// Name of the cause in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Geometry => "geometry",
@@ -160,7 +160,7 @@ impl Margin {
     }
 }
 
-/// Largest speeds as the margins are added one after the other, m/s; no speed exceeds the one before.
+/// Largest speeds as the margins are added one after the other, m/s; no speed exceeds the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.
@@ -180,9 +180,9 @@ pub struct Margins {
 }
 
 impl Margins {
-    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s; no speed may exceed the one before.
+    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s; no speed may exceed the previous one.
     pub fn of(speeds_mps: [f64; 6], pass_error_m: f64) -> Self {
-        // Each speed is raised to the largest one after it, so that a margin with a negative cost counts as zero.
+        // Each speed is raised to the largest later speed, so that a margin with a negative cost counts as zero.
         let mut most = 0.0_f64;
         let mut speeds = speeds_mps;
         for speed in speeds.iter_mut().rev() {
@@ -273,7 +273,7 @@ mod tests {
             t_y_m: 0.1,
         };
         assert!((sure.at_m(0.1) - (0.5 - 2.0 * 0.01)).abs() < 1e-9);
-        // Each time is 4 s plus 0.4 of 16 s, 8 s or 0 s.
+        // Each expected error time is 4 s plus 0.4 of 16 s, 8 s or 0 s.
         let times_s = [10.4, 7.2, 4.0];
         let error_m = |time_s: f64| 0.012 * math::exp(GROWTH * math::ln(time_s / times_s[1]));
         let at = [0.05, 0.1, f64::INFINITY].map(|speed_mps| sure.at_m(speed_mps));
@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn margin_costs_add_up_and_the_costliest_is_named() {
         let margins = Margins::of([0.23, 0.118, 0.117, 0.118, 0.108, 0.1], 0.02);
-        // The gain by swing is set to zero; it does not reduce the cost of phase.
+        // A negative cost of swing is set to zero, and does not reduce the cost of phase.
         let expected = [0.23, 0.118, 0.118, 0.118, 0.108, 0.1];
         assert!(margins.speeds_mps().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
         let sum: f64 = margins.prices_mps().iter().map(|(_, price)| price).sum();

@@ -7,12 +7,12 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Length of the past period whose most restrictive advice is displayed.
 const HOLD: DurNs = DurNs(1_000_000_000);
-/// Time for which a higher speed must last before it is displayed.
+/// Time for which a higher advised speed must last before it is displayed.
 ///
-/// The speed must exceed the displayed one by [`RISES_BY`]: 3 mm/s at 0.1 m/s.
+/// The higher speed must exceed the displayed one by [`RISES_BY`]: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
-/// A lower speed is displayed at once if it is lower by this share.
+/// A lower advised speed is displayed at once if it is lower than the displayed one by this share.
 ///
 /// Smaller differences are within half of the speed margin.
 const FALLS_BY: f64 = SPEED_MARGIN / 2.0;
@@ -44,7 +44,7 @@ pub struct Hysteresis {
     may_exceed: bool,
     /// Displayed speed, m/s, and the time of the latest advice.
     shown: Option<(MonoNs, f64)>,
-    /// Time since which all speeds exceed the displayed one, and the lowest of these speeds, m/s.
+    /// Time since which all advised speeds exceed the displayed one, and the lowest of these speeds, m/s.
     rising: Option<(MonoNs, f64)>,
 }
 
@@ -65,7 +65,7 @@ impl Hysteresis {
         }
     }
 
-    /// Resets the filter, because the vehicle has turned back and other speeds apply.
+    /// Resets the filter, because the vehicle has reversed its direction and other speeds apply.
     pub fn forget(&mut self) {
         *self = Self::new(self.target_m);
     }
@@ -132,7 +132,7 @@ impl Hysteresis {
 
 /// Whether the predicted spacing T exceeds a limit.
 ///
-/// Without a prediction, the result is the forecast of the advice itself.
+/// Without a predicted T, the result is the forecast in the advice itself.
 fn exceeds(advice: &Advice, limit_m: f64) -> bool {
     advice.predicted_t_m.map_or(advice.will_exceed, |t_m| t_m > limit_m)
 }
@@ -212,7 +212,7 @@ mod tests {
         let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
         let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
-        // The low speed counts for a second, and the higher one must then last for ten seconds.
+        // The low speed stays in the history for a second, and the higher speed must then last for ten seconds.
         assert_eq!(speeds[10..66], [0.1; 56]);
         assert_eq!(speeds[66..], [0.2; 15]);
     }
@@ -222,7 +222,7 @@ mod tests {
         let wavering = (0..300).map(|k| speed(0.1 + if k % 7 < 3 { 0.0009 } else { 0.0027 }));
         let speeds: Vec<f64> = shown(wavering).iter().map(|advice| advice.v_max_mps).collect();
         assert!(speeds[1..].iter().all(|speed_mps| (speed_mps - 0.1009).abs() < 1e-12));
-        // A slowly falling speed is followed, with a lag of at most 0.5 %.
+        // The displayed speed follows a slowly falling advised speed, with a lag of at most 0.5 %.
         let sinking: Vec<_> = (0..300).map(|k| speed(0.1 - 1e-4 * f64::from(k))).collect();
         let shown = shown(sinking.iter().copied());
         let over = |(shown, given): (&Advice, &Advice)| shown.v_max_mps > given.v_max_mps * 1.0051;

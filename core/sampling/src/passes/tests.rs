@@ -51,8 +51,8 @@ fn place_hidden_from_some_heads_has_longer_gaps() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
-    // Without two heads half a turn apart, the gap doubles. Without two heads a quarter turn apart, two successive
-    // passes are missing.
+    // Without two of four heads that are half a turn apart, the longest gap doubles. Without two that are a quarter
+    // turn apart, two successive passes are missing.
     assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
     assert_eq!(passes.gap_s(HeadSet::default()), None);
     assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
@@ -98,7 +98,8 @@ fn reversed_vehicle_reverses_the_order_of_heads() {
     // ahead does not.
     assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
     assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
-    // If the vehicle yaws, the distance of heads along the tunnel grows. Scan planes along the tunnel have no phase.
+    // If the vehicle yaws, the distance of heads along the tunnel grows. Heads whose scan planes lie along the tunnel
+    // have no phase.
     let askew = |yaw: f64| Rot::from_roll_pitch_yaw(0.0, 0.0, yaw);
     let mount = Mount { position: Vec3::new(1.0, 0.0, 0.0), rotation: Rot::identity() };
     assert!((ahead_m(&askew(0.5), &mount).unwrap() - 1.0 / math::cos(0.5)).abs() < 1e-12);
@@ -110,8 +111,8 @@ fn late_head_has_a_positive_phase_error() {
     // The second of two heads should be half a turn ahead, but is only 150 degrees ahead.
     let passes = passes(&[0.0, 150.0], &[0.0, 0.0]);
     assert!((passes.phase_errors_rad(2)[1].unwrap() - f64::to_radians(30.0)).abs() < 1e-9);
-    // At 10 % above the planned speed, the error of a head 1.6 m astern (the advance of one turn) is 1 - 1 / 1.1 of a
-    // turn.
+    // At 10 % above the planned speed, the phase error of a head 1.6 m astern (the advance of one turn) is 1 - 1 /
+    // 1.1 of a turn.
     let at = |speed| Phasing::of(&situation(&[0.0, 180.0], &[1.6, 0.0])).at(speed).phase_errors_rad(2)[1];
     assert!(at(0.2).unwrap().abs() < 1e-9);
     assert!((at(0.22).unwrap() - TAU * (1.0 - 1.0 / 1.1)).abs() < 1e-9, "{:?}", at(0.22));
@@ -177,7 +178,7 @@ fn parallax_is_larger_in_a_narrow_tunnel() {
     assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
 }
 
-/// The result does not depend on the position of the vehicle's origin along the hull.
+/// The mean distance does not depend on the position of the vehicle's origin along the hull.
 #[test]
 fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
     for origin_m in [-3.0, 0.0, 0.4, 5.0] {
@@ -191,7 +192,7 @@ fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
             (vec![0.9, -0.3], 1.2, 1.0),
             (vec![0.9, 0.9, -0.3, -0.3], 1.2, 0.5),
             (vec![0.9, -0.3, 0.9, -0.3], 1.2, 1.0),
-            // The mean is over two steps of half the distance, and the whole distance from the last head back to the
+            // The mean is over two distances of half the spread, and the whole spread from the last head back to the
             // first.
             (vec![0.0, 0.4, 0.8], 0.8, 2.0 / 3.0),
             (vec![0.7, 0.7], 0.0, 0.0),

@@ -215,7 +215,7 @@ fn each_margin_lowers_the_speed_down_to_the_largest_planned_speed() {
 
 /// The stated range is the smallest of the heads' maximum ranges. The ping period follows from the turn period.
 #[test]
-fn plan_states_its_reach_and_ping_period() {
+fn plan_states_the_maximum_range_and_ping_period() {
     let mut shorter = ideal(2);
     shorter.heads[1].0.range_m[1] = 8.0;
     // With a speed of sound 10 % higher, the same times give ranges 10 % longer.

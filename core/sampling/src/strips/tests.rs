@@ -59,7 +59,7 @@ fn closed(target_m: f64, t_y_m: f64, gap_s: f64) -> f64 {
 }
 
 #[test]
-fn full_view_gives_one_strip() {
+fn wall_seen_by_all_heads_is_one_strip() {
     let one = strips(&[all_around(&[]), all_around(&[])]);
     let whole = Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2), hidden: false, wait: 1.0 };
     assert_eq!(one.as_slice(), [whole]);
@@ -243,7 +243,7 @@ fn swing_and_shift_widen_the_distance_between_passes() {
 }
 
 #[test]
-fn wall_out_of_reach_is_hidden() {
+fn wall_beyond_the_range_limits_counts_as_hidden() {
     let profile = shapes::rectangle(8.0, 4.0).unwrap();
     let ring = ring(&profile);
     let hidden = |reach_m: [f64; 2]| {
