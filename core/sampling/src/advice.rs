@@ -356,7 +356,7 @@ impl Advisor {
         }
     }
 
-    /// Returns the largest speed at which the present phases meet a target, and the advised speed.
+    /// Returns the largest speed at which the heads' present phases meet a target, and the advised speed.
     ///
     /// Errors: no speed meets the target, whatever the heads' phases.
     fn fastest(

@@ -6,9 +6,9 @@ use headrace_geometry::frames::{Body, Mount, Rot, Sensor, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
 
-/// A head without a return for this long counts as silent.
+/// Duration without a return after which a head counts as silent.
 ///
-/// The program does not wait for a silent head, and does not use it in the advice.
+/// Headrace does not wait for a silent head, and leaves it out of the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
 /// Tolerance for a whole number of steps per turn, because steps are specified in decimal degrees.

@@ -34,7 +34,8 @@ pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingErr
 
 /// T_c, m: the step along a circular wall for a head at its centre, the same everywhere on it.
 ///
-/// The step is the chord between two samples. `radius_m` > 0 is the paper's b / 2; `step_rad` > 0 is the step theta.
+/// The step is the straight-line distance between two samples. `radius_m` > 0 is the paper's b / 2; `step_rad` > 0 is
+/// the step theta.
 /// Errors: an argument out of range.
 /// Source: Jorge et al. 2021, Eq. 7 (b sin(theta / 2)).
 pub fn t_c_m(radius_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
@@ -74,7 +75,7 @@ pub fn overlap(beam_rad: f64, step_rad: f64) -> Result<f64, SamplingError> {
     Ok(positive("the beam's width in radians", beam_rad)? / positive("the step in radians", step_rad)?)
 }
 
-/// eta, m: range resolution of a head: its span of ranges divided by the number of counts.
+/// eta, m: range resolution of a head, which is its span of ranges divided by the number of counts.
 ///
 /// Errors: no counts, a negative least range, or an empty span of ranges.
 /// Source: Jorge et al. 2021, §6.
@@ -110,7 +111,7 @@ pub fn footprint_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> Result<f64
     Ok(distance_m * math::sin(beam_rad) / (far * near))
 }
 
-/// cos(m x) for m x in [0, pi/2).
+/// Returns cos(m x) for m x in [0, pi/2), with m x in twice double precision.
 fn cos_of_multiple(m: u32, x_rad: f64) -> Result<f64, SamplingError> {
     let (high, low) = product(f64::from(m), x_rad);
     above_zero(high, math::cos(high) - math::sin(high) * low)
@@ -124,7 +125,7 @@ fn sin_of_multiple(m: u32, x_rad: f64) -> f64 {
 /// cos(a + b) for |a + b| < pi/2.
 fn cos_of_sum(a_rad: f64, b_rad: f64) -> Result<f64, SamplingError> {
     let high = a_rad + b_rad;
-    // Rounding error of the sum (Knuth's two-sum).
+    // Rounding error of a sum of two doubles (Knuth's two-sum).
     let b_part = high - a_rad;
     let low = (a_rad - (high - b_part)) + (b_rad - b_part);
     above_zero(high, math::cos(high) - math::sin(high) * low)
@@ -224,7 +225,7 @@ mod tests {
             prop_assert!(t_y2_m(h, step, m).unwrap() < t_y2_m(h, step, m + 1).unwrap());
         }
 
-        /// T_c < T_y1: a circular crown is sampled more densely than a floor at the same distance.
+        /// T_c < T_y1, so a circular crown is sampled more densely than a floor at the same distance.
         #[test]
         fn crown_is_sampled_more_densely_than_the_floor(h in 0.01..100.0f64, step in 1e-3..1.5f64) {
             prop_assert!(t_c_m(h, step).unwrap() < t_y1_m(h, step).unwrap());

@@ -27,11 +27,11 @@ pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_per
 ///
 /// `None` if `t_y_m` alone reaches the target.
 pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
-    // (T - t)(T + t) avoids cancellation for t close to T.
+    // The form (T - T_y)(T + T_y) avoids cancellation if T_y is close to T.
     (t_y_m < target_m).then(|| math::sqrt((target_m - t_y_m) * (target_m + t_y_m)))
 }
 
-/// The spiral of samples on the wall at a constant speed.
+/// The spiral of samples that a turning head leaves on the wall at a constant vehicle speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spiral {
     speed_mps: f64,
@@ -79,7 +79,8 @@ impl Spiral {
         math::hypot(self.advance_m(), smallest_step_m)
     }
 
-    /// Mean step, m, from the mean step `t_yp_m` of a head at rest, as printed in Eq. 15.
+    /// Mean distance between samples of a turn, m, from the mean step `t_yp_m` of a head at rest, as printed in Eq.
+    /// 15.
     ///
     /// The term (n d)^2 under the root of Eq. 15 combines a whole turn's advance with a single step.
     /// [`Spiral::t_y_mean_m`] uses the advance of one step, so that both values can be displayed.
@@ -88,7 +89,8 @@ impl Spiral {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
     }
 
-    /// Mean step, m: the mean step of a head at rest combined with the advance of one step.
+    /// Mean distance between samples of a turn, m: the mean step of a head at rest combined with the advance between
+    /// pings.
     pub fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_yp_m)
     }

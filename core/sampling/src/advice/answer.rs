@@ -125,7 +125,7 @@ pub struct Alternative {
     pub mode: ModeName,
     /// The largest speed that meets the target with the heads started in phase, m/s.
     ///
-    /// Zero if no speed does.
+    /// Zero if no speed meets it.
     pub v_max_mps: f64,
 }
 

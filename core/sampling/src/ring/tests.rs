@@ -25,7 +25,7 @@ fn standing(profile: &Profile) -> Standing<'_> {
 
 /// The reference table lists T_max of Eq. 16 for `ceran` at 0.197 m/s.
 ///
-/// The pings are at their actual angles.
+/// In this test, the pings are at the head's actual angles.
 #[test]
 fn t_max_equals_the_reference_table() {
     let profile = shapes::ceran().unwrap();
@@ -99,7 +99,8 @@ fn yaw_lengthens_steps_and_beam_along_the_tunnel_is_an_error() {
     let head = Standing::new(&profile, &turned, &mount()).unwrap();
     let ring = Ring::cast(&head, 0.0, 400).unwrap();
     assert!(ring.largest_step_m(1) > Ring::cast(&standing(&profile), 0.0, 400).unwrap().largest_step_m(1));
-    // At a yaw of 15 degrees, the beam to the left wall is tan(15 degrees) of its lateral range ahead or astern.
+    // At a yaw of 15 degrees, the beam to the left wall meets it ahead or astern by tan(15 degrees) times the lateral
+    // range.
     let left = head.sounding(math::FRAC_PI_2).unwrap();
     assert!((left.beam.x() / left.beam.y() + math::tan(f64::to_radians(15.0))).abs() < 1e-12);
 
@@ -142,7 +143,7 @@ fn step_with_few_pings_per_turn_spans_at_least_half_of_the_perimeter() {
     let near = Standing::new(&profile, &pose(&profile, 9.9, 0.0, 0.0), &mount()).unwrap();
     let ring = Ring::cast(&near, 0.0, 1200).unwrap();
     assert!(ring.largest_step_m(400) > 0.8 * perimeter_m, "{}", ring.largest_step_m(400));
-    // The steps of a turn add up to one perimeter.
+    // The distances between the samples of a turn add up to one perimeter.
     for stride in [1, 8, 400] {
         let around: f64 = ring.steps_m(stride).step_by(stride).sum();
         assert!((around - perimeter_m).abs() < 1e-9);
