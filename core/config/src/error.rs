@@ -23,7 +23,7 @@ pub struct ConfigError {
 }
 
 impl ConfigError {
-    /// Formats the parts without any escaping.
+    /// Formats the parts of the error without escaping special characters.
     fn text(&self) -> String {
         let Self { file, line, key, value, problem } = self;
         let value = value.as_ref().map(|value| format!(" = {value}")).unwrap_or_default();
@@ -67,7 +67,7 @@ impl ConfigErrors {
         self
     }
 
-    /// The errors.
+    /// All errors of the file.
     pub fn errors(&self) -> &[ConfigError] {
         &self.0
     }
@@ -79,7 +79,7 @@ impl From<ConfigError> for ConfigErrors {
     }
 }
 
-/// One error per line.
+/// Formats the errors, one per line.
 impl fmt::Display for ConfigErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (number, error) in self.0.iter().enumerate() {
@@ -101,7 +101,7 @@ pub(super) const MOST_ERRORS: usize = 100;
 pub(super) struct Notes(Option<Rc<RefCell<Vec<ConfigError>>>>);
 
 impl Notes {
-    /// An empty collection.
+    /// Creates an empty collection of errors.
     pub(super) fn collecting() -> Self {
         Self(Some(Rc::default()))
     }
@@ -119,12 +119,12 @@ impl Notes {
         }
     }
 
-    /// Returns the first error that satisfies `is_so`.
+    /// Returns the first collected error that satisfies `is_so`.
     pub(super) fn find(&self, is_so: impl Fn(&ConfigError) -> bool) -> Option<ConfigError> {
         self.0.as_ref()?.borrow().iter().find(|error| is_so(error)).cloned()
     }
 
-    /// Whether there are more errors than will be reported.
+    /// Whether more errors were found than will be reported.
     pub(super) fn are_enough(&self) -> bool {
         self.count() > MOST_ERRORS
     }

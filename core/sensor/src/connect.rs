@@ -30,12 +30,12 @@ pub enum SerialPort {
     Usb(UsbIdentity),
 }
 
-/// A parsed `connect`.
+/// A parsed `connect` value from a vehicle file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Connect {
     /// `serial:/dev/serial/by-id/...?baud=115200` or `serial:usb:VID:PID[:SERIAL]?baud=115200`.
     Serial {
-        /// The port.
+        /// Serial port of the device.
         port: SerialPort,
         /// Bits per second; 8 data bits, no parity, 1 stop bit.
         baud: u32,
@@ -54,7 +54,7 @@ pub enum Connect {
     ///
     /// Only one sender is accepted: the one in `from`, or else the first whose message the device's driver accepts.
     UdpListen {
-        /// Local address and port.
+        /// Local address and port at which the host receives.
         address: String,
         /// Host of the device, optionally with its port; any host if `None`.
         from: Option<String>,
@@ -75,26 +75,26 @@ pub enum Connect {
     },
 }
 
-/// Error in a `connect`.
+/// Error in the value of a `connect` key.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("connect = {text:?}: {problem}; {allowed}")]
 pub struct ConnectError {
-    /// The text as written.
+    /// The value of `connect` as written.
     pub text: String,
-    /// The fault.
+    /// Description of the fault.
     pub problem: String,
     /// Allowed forms, with an example.
     pub allowed: String,
 }
 
-/// All forms, listed in errors about a text with none of them.
+/// All forms of `connect`, listed in errors about a text that has none of them.
 const FORMS: &str = "allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, \
      tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40";
 
 impl Connect {
     /// Parses the `connect` of a sensor in a vehicle file.
     ///
-    /// Errors: the text has none of the forms of [`Connect`]; the message lists the allowed ones.
+    /// Errors: the text has none of the forms of [`Connect`]; the message lists the allowed forms.
     pub fn parse(text: &str) -> Result<Self, ConnectError> {
         let refused = |problem: &str, allowed: &str| ConnectError {
             text: text.to_owned(),
@@ -138,7 +138,7 @@ impl Connect {
         }
     }
 
-    /// Carrier of the connection.
+    /// Carrier of the connection: serial, TCP, UDP, CAN, HID or I2C.
     pub fn carrier(&self) -> Carrier {
         match self {
             Self::Serial { .. } => Carrier::Serial,

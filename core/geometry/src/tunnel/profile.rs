@@ -32,7 +32,7 @@ const PLACES: u32 = 64;
 pub struct Profile {
     elements: Vec<Element>,
     tree: Tree,
-    /// Extent by direction, present only for many elements.
+    /// Table of the profile's extent by direction, present only for many elements.
     support: Option<Support>,
     perimeter_m: f64,
     reference: Yz,
@@ -47,7 +47,7 @@ pub struct WallHit {
     pub range_m: f64,
     /// Arc length of the intersection, m.
     pub arc_m: f64,
-    /// The intersection.
+    /// The intersection point.
     pub point: Yz,
     /// Unit normal of the wall at the intersection, pointing inwards.
     pub normal: Yz,
@@ -66,7 +66,7 @@ pub enum ProfileError {
     /// A coordinate is not finite, or exceeds 1000 m.
     #[error("vertex {vertex} has a coordinate that is not a number within 1000 m")]
     NotFinite {
-        /// Index of the vertex, from zero.
+        /// Index of the vertex, counted from zero.
         vertex: usize,
     },
     /// As seen from the reference point, the wall at this vertex is hidden or runs backwards.
@@ -189,7 +189,7 @@ impl Profile {
 
     /// Casts a ray like [`Profile::cast`], but does not check that `origin` is inside.
     ///
-    /// It is used for many rays from one point that is known to be inside.
+    /// For many rays from one point that is known to be inside.
     pub fn cast_from_inside(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         self.hit(origin, direction)
     }
@@ -288,7 +288,7 @@ impl Profile {
         let entry = |bounds: &Bounds| bounds.entry(origin, direction);
         self.tree.search(self.elements.len(), entry, |some| {
             for (index, element) in self.elements.iter().enumerate().take(some.end).skip(some.start) {
-                // Among equally near elements, the first along the wall is the result, whatever the order of the
+                // Among equally near elements, the first one along the wall is the result, whatever the order of the
                 // search.
                 if let Some(t) = element.crossing(origin, direction)
                     && best.is_none_or(|nearest| (t, index) < nearest)

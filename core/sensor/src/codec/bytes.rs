@@ -11,9 +11,9 @@ pub struct Bytes<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("storing {len} bytes; at most {max} are allowed")]
 pub struct TooLong {
-    /// Required length, bytes.
+    /// Number of bytes that the contents would need.
     pub len: usize,
-    /// Capacity, bytes.
+    /// Capacity of the byte string, bytes.
     pub max: usize,
 }
 
@@ -24,7 +24,7 @@ impl<const N: usize> Default for Bytes<N> {
 }
 
 impl<const N: usize> Bytes<N> {
-    /// Creates a copy of `bytes`.
+    /// Creates a byte string with a copy of `bytes`.
     ///
     /// Errors: `bytes` has more than `N` bytes.
     pub fn new(bytes: &[u8]) -> Result<Self, TooLong> {
