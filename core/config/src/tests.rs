@@ -101,7 +101,7 @@ fn valid_text_is_read_and_unknown_key_is_rejected() {
 }
 
 #[test]
-fn error_about_an_unknown_key_or_word_suggests_a_similar_one() {
+fn error_about_an_unknown_word_suggests_a_similar_word() {
     let root = Document::new("v.toml", "profile = \"cercle\"\n").root().unwrap();
     let error = root.choice("profile", &[("arch", 1), ("circle", 2)]).unwrap_err();
     assert_eq!(
