@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_key_is_rejected() {
+    fn change_of_a_missing_key_is_rejected() {
         let missing = "is not in the vehicle file, so it can't be changed";
         let tables = "\n[[openings]]\nname = \"gate\"";
         assert_eq!(change(tables).unwrap_err(), format!("s.toml:2: openings = [[openings]]: {missing}"));

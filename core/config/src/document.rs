@@ -22,7 +22,7 @@ impl<'a> Document<'a> {
         Self { file, text }
     }
 
-    /// Parses the root table.
+    /// Parses the root table of the TOML text.
     pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
         self.is_short()?;
         DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| self.broken(&error))

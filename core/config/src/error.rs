@@ -1,4 +1,4 @@
-//! Errors of hand-written files, and their collection.
+//! Errors of hand-written files, and a collection of such errors.
 
 use core::cell::RefCell;
 use core::fmt;
@@ -10,15 +10,15 @@ use super::plain::one_line;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}", one_line(&self.text()))]
 pub struct ConfigError {
-    /// The file, as the caller named it.
+    /// The name of the file, as given by the caller.
     pub file: String,
-    /// Line, counted from one.
+    /// Line of the error, counted from one.
     pub line: usize,
-    /// Dotted path of the key.
+    /// Dotted path of the key that the error concerns.
     pub key: String,
-    /// The value of the key, if present.
+    /// The wrong value of the key, if present.
     pub value: Option<String>,
-    /// The problem and the allowed values.
+    /// The problem with the value, and the allowed values.
     pub problem: String,
 }
 

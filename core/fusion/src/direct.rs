@@ -24,12 +24,12 @@ const STALE: DurNs = DurNs(2_000_000_000);
 /// Time window of tether readings from which the speed is computed, and the maximum number of these readings.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
-/// Standard deviation of an echo's range, m.
+/// Standard deviation of an echosounder's range, m.
 const ECHO_SD_M: f64 = 0.01;
 /// Standard deviation of the prior position, across and up, m.
 const PRIOR_SD_M: [f64; 2] = [10.0, 1.0];
 
-/// Navigation without a filter.
+/// Navigation without a Kalman filter.
 pub struct DirectNavigation {
     profile: Profile,
     site: Site,
@@ -111,7 +111,7 @@ impl DirectNavigation {
         let up = self.attitude.map_or(mount.position.z(), |(_, attitude)| (attitude * mount.position).z());
         let height_m = self.site.surface_above_floor_m - self.site.depth_m(pressure_pa) - up;
         self.height_m = Some(height_m);
-        // Without recent echoes, depth alone updates the height.
+        // Without recent echoes, the depth sensor alone updates the height.
         let silent = self.echoes.iter().flatten().all(|(echoed, _)| at.since(*echoed).0.abs() > ECHO_AGE.0);
         if let (true, Some((_, place))) = (silent, &mut self.place) {
             place[1] = height_m + self.height_offset_m;

@@ -23,9 +23,9 @@ pub struct Echo {
 /// A fitted position in the cross-section, and whether echoes determine its height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// y and z, m.
+    /// Coordinates y and z of the position, m.
     pub at_m: [f64; 2],
-    /// Whether an echo determines the height.
+    /// Whether an echo determines the height of the position.
     pub is_height_seen: bool,
 }
 

@@ -32,7 +32,7 @@ pub struct StuckSensor {
     /// Mean length of runs of identical readings, and length of the present run, both as numbers of readings.
     usual_run: f64,
     run: u32,
-    /// Start time of the present run.
+    /// Start time of the present run of identical readings.
     since: MonoNs,
 }
 
@@ -46,7 +46,7 @@ impl StuckSensor {
             (self.since, self.run) = (at, 1);
             return false;
         };
-        // The comparison is bitwise, because a stuck unit repeats its bytes.
+        // Readings are compared bit by bit, because a stuck unit repeats its bytes.
         if now.map(f64::to_bits) == before.map(f64::to_bits) {
             self.run = self.run.saturating_add(1);
             return self.has_hung(at);
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn noisy_unit_with_constant_reading_is_stuck_after_0_5_s() {
+    fn noisy_inertial_unit_with_constant_reading_counts_as_stuck_after_0_5_s() {
         let frozen = noisy(999);
         let all = hangs(
             (0..1000).map(noisy).chain(std::iter::repeat_n(frozen, 1000)).chain((2000..2100).map(noisy)),
@@ -111,7 +111,7 @@ mod tests {
     /// The simulator's ideal units repeat a reading while the motion is steady. Every change of motion changes the
     /// reading.
     #[test]
-    fn noise_free_unit_is_never_stuck() {
+    fn noise_free_inertial_unit_never_counts_as_stuck() {
         let swaying = |k: u64| [1e-2 * math::sin(k as f64 / 800.0), 0.0, 2e-2 * math::cos(k as f64 / 1700.0)];
         let still = [0.0; 3];
         let all = (0..4000)
@@ -125,7 +125,7 @@ mod tests {
     /// A coarsely quantised unit at rest repeats each reading for a while. The coarser the unit, the longer the
     /// detection takes.
     #[test]
-    fn coarsely_quantised_unit_at_rest_is_not_stuck() {
+    fn coarsely_quantised_inertial_unit_at_rest_does_not_count_as_stuck() {
         // One reading in two hundred differs from the others. So a run of three readings is no evidence, and neither
         // is one of two thousand.
         let coarse = |k: u64| {

@@ -245,7 +245,7 @@ impl<To, From> fmt::Debug for Rot<To, From> {
 /// Position and attitude of the vehicle in the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Origin of the body frame.
+    /// Position of the body frame's origin in the tunnel.
     pub position: Point3<Tunnel>,
     /// Rotation from body to tunnel frame.
     pub attitude: Rot<Tunnel, Body>,
@@ -262,7 +262,7 @@ impl Pose {
 /// Position and attitude of a sensor on the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mount {
-    /// Origin of the sensor frame in the body frame.
+    /// Position of the sensor frame's origin in the body frame.
     pub position: Vec3<Body>,
     /// Rotation from sensor to body frame.
     pub rotation: Rot<Body, Sensor>,

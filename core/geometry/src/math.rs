@@ -81,7 +81,7 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
     }
     debug_assert!(modulus > 0.0 && modulus.is_finite(), "a modulus is positive and finite: {modulus}");
     let r = value - modulus * libm::floor(value / modulus);
-    // Rounding can make r equal to the modulus, or slightly negative.
+    // Rounding can make the remainder r equal to the modulus, or slightly negative.
     if r >= modulus || r < 0.0 { 0.0 } else { r }
 }
 

@@ -13,7 +13,7 @@ pub struct Site {
     pub surface_pressure_pa: f64,
     /// Height of the water's surface above the tunnel's floor at the portal, m.
     pub surface_above_floor_m: f64,
-    /// Yaw of the tunnel's axis in the IMU's level reference, radians.
+    /// Yaw of the tunnel's axis in the IMU's level reference frame, radians.
     pub axis_yaw_rad: f64,
 }
 

@@ -52,7 +52,7 @@ pub enum SnapshotError {
     Unfit {
         /// Name of the part of the state that was being restored.
         part: String,
-        /// The cause.
+        /// The cause of the failure to restore.
         why: String,
     },
     /// A value cannot be written.
@@ -60,12 +60,12 @@ pub enum SnapshotError {
     Unsaved {
         /// Name of the part of the state that was being saved.
         part: String,
-        /// The cause.
+        /// The cause of the failure to save.
         why: String,
     },
 }
 
-/// Writes a snapshot.
+/// Writer of a snapshot.
 #[derive(Debug, Default)]
 pub struct Saver {
     bytes: Vec<u8>,
@@ -118,7 +118,7 @@ impl Saver {
     }
 }
 
-/// Reads a snapshot.
+/// Reader of a snapshot.
 #[derive(Debug)]
 pub struct Restorer<'a> {
     bytes: &'a [u8],

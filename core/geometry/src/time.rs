@@ -62,7 +62,7 @@ impl MonoNs {
 impl Add<DurNs> for MonoNs {
     type Output = Self;
 
-    /// The sum saturates at both ends of the clock's range.
+    /// Overflow of the sum saturates at either end of the clock's range.
     fn add(self, span: DurNs) -> Self {
         Self(self.0.saturating_add_signed(span.0))
     }
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_over_10_hours_sum_exactly() {
+    fn time_steps_over_10_hours_sum_exactly() {
         let step = DurNs::from_secs_f64(0.0048);
         let mut now = MonoNs(0);
         for _ in 0..7_500_000 {

@@ -35,18 +35,18 @@ pub const MAX_MODES: usize = 8;
 const ALTERNATIVES_EVERY: u32 = 25;
 /// Number of iterations that solve for the speed and the position margin, which depend on each other.
 const FALLS: u32 = 3;
-/// Speed below which the last direction of travel is kept, m/s.
+/// Speed below which the last direction of travel is assumed to continue, m/s.
 const UNDER_WAY_MPS: f64 = 0.02;
-/// Capacity for stretches of wall outside a head's range limits.
+/// Maximum number of stretches of wall outside a head's range limits.
 const OUT_OF_REACH: usize = 16;
 
 /// The largest speed that meets a target, as found by the search.
 struct Fastest {
     /// The largest speed that meets the target, m/s.
     speed_mps: f64,
-    /// Advised speed after the margin for speed errors, m/s.
+    /// Advised speed, which is lower by the margin for speed errors, m/s.
     advised_mps: f64,
-    /// T_y at the place that limits the speed, m.
+    /// T_y (largest distance between samples of a turn) at the place that limits the speed, m.
     t_y_m: f64,
 }
 
@@ -92,7 +92,7 @@ pub struct Advisor {
     astern: bool,
     /// Largest speed that met the target in the last update.
     last_mps: Option<f64>,
-    /// Distance that the vehicle may move before rings are recast, m.
+    /// Distance that the vehicle may move before the heads' rings are recast, m.
     still_m: f64,
 }
 
@@ -384,7 +384,7 @@ impl Advisor {
         Ok(Fastest { speed_mps, advised_mps: driving.kept_back_mps(speed_mps), t_y_m })
     }
 
-    /// Distance that the vehicle may move before rings are recast, m.
+    /// Returns the distance that the vehicle may move before the heads' rings are recast, m.
     fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
         if let Some(anew_m) = self.task.looks.anew_m {
             return anew_m;

@@ -13,7 +13,7 @@ pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
 /// Tolerance for a whole number of steps per turn, because steps are specified in decimal degrees.
 const WHOLE_STEPS: f64 = 1e-6;
-/// Maximum number of steps per turn.
+/// Maximum number of angular steps per turn of a head.
 const MAX_STEPS: f64 = 100_000.0;
 
 /// Rotation of a head in a whole number of equal steps per turn, with a ping at each step.
@@ -104,18 +104,18 @@ pub struct HeadMode {
 /// The body of a head: a cylinder around the head's axis, which may occlude neighbouring heads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadBody {
-    /// Radius, m; zero for a head without a body.
+    /// Radius of the body, m; zero for a head without a body.
     pub radius_m: f64,
-    /// Extent ahead of the beam along the sensor's +x, m.
+    /// Extent of the body ahead of the beam, along the sensor's +x, m.
     pub ahead_m: f64,
-    /// Extent behind the beam, m.
+    /// Extent of the body behind the beam, m.
     pub behind_m: f64,
 }
 
 /// Properties of a head that are needed to schedule its rotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadSpec {
-    /// Mounting on the vehicle.
+    /// Position and attitude of the head on the vehicle.
     pub mount: Mount,
     /// Angle between two pings, radians.
     pub step_rad: f64,
@@ -127,7 +127,7 @@ pub struct HeadSpec {
     pub sound_speed_mps: f64,
     /// zeta: full width of the beam, radians.
     pub beam_rad: f64,
-    /// Body of the head.
+    /// Body of the head, which may occlude other heads.
     pub body: HeadBody,
 }
 
@@ -141,7 +141,7 @@ impl HeadSpec {
 /// Rotation program of a head for a dive: start angle, direction and sector, with angles in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadProgram {
-    /// Angle of the first ping, radians.
+    /// Head angle at the first ping, radians.
     pub start_rad: f64,
     /// Whether the head's first step is towards growing angles.
     pub growing: bool,
@@ -152,11 +152,11 @@ pub struct HeadProgram {
 /// Measured motion of a head that is turning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadMotion {
-    /// Mounting on the vehicle.
+    /// Position and attitude of the head on the vehicle.
     pub mount: Mount,
     /// Current angle of the head in the sensor frame, radians.
     pub angle_rad: f64,
-    /// Rate of rotation, rad/s, positive where the angle grows.
+    /// Rate of the head's rotation, rad/s, positive where its angle grows.
     pub rate_radps: f64,
     /// Angle between two pings, radians, positive.
     pub step_rad: f64,

@@ -48,7 +48,7 @@ impl HeadSet {
         self.0 & Self::bit(head) != 0
     }
 
-    /// Number of heads.
+    /// Number of heads in the set.
     pub fn len(self) -> usize {
         self.0.count_ones() as usize
     }

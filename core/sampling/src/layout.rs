@@ -102,7 +102,7 @@ pub struct InSector {
 pub struct Sector {
     /// Sector number, from zero at the floor.
     pub number: usize,
-    /// Number of sectors.
+    /// Number of sectors of all heads.
     pub of: usize,
     /// Distance of the head behind the first head, m.
     pub behind_m: f64,

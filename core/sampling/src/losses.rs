@@ -34,7 +34,7 @@ const MOST_SHARE: f64 = 0.999;
 /// Rate at which a head's pings lose their returns by chance.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LossRate {
-    /// Share of lost pings among all pings, from 0 to 1.
+    /// Share of pings with lost returns among all pings, from 0 to 1.
     pub share: f64,
     /// Share of lost pings among those that follow a lost ping, from 0 to 1.
     pub after_lost: f64,
@@ -48,7 +48,7 @@ impl LossRate {
         rate
     }
 
-    /// Whether both shares are from 0 to 1.
+    /// Whether both shares of lost pings are from 0 to 1.
     pub fn is_valid(&self) -> bool {
         [self.share, self.after_lost].iter().all(|share| (0.0..=1.0).contains(share))
     }

@@ -21,7 +21,7 @@ const MOST_SHARE: f64 = 0.2;
 /// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share
 /// of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
-/// Speed below which a vehicle counts as stationary, m/s.
+/// Speed below which a vehicle counts as at rest, m/s.
 const SLOW_MPS: f64 = 0.01;
 /// Limit for the time until the rearmost head reaches the position of the foremost head, seconds.
 const LONGEST_APART_S: f64 = 20.0;
@@ -70,13 +70,13 @@ pub struct RemainingTarget {
     pub target_m: f64,
     /// Number of standard deviations of a hole's size by which a passed section stays below the target.
     pub confidence_sd: f64,
-    /// Standard deviation of a hole's size as measured, m.
+    /// Standard deviation of a hole's size as measured at the present speed, m.
     pub pass_error_m: f64,
     /// Value of [`error_time_s`] when `pass_error_m` was measured, seconds.
     pub measured_s: f64,
     /// Time between two passes of evenly spread heads, seconds.
     pub even_gap_s: f64,
-    /// Length of hull between the heads, m.
+    /// Length of hull between the foremost and the rearmost head, m.
     pub apart_m: f64,
     /// The largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
@@ -93,7 +93,7 @@ impl RemainingTarget {
         self.target_m - position_margin_m(self.target_m, self.confidence_sd, error_m, self.t_y_m)
     }
 
-    /// Returns the target minus the margin at unlimited speed, m.
+    /// Returns the target minus the margin for position errors at unlimited speed, m.
     pub fn most_m(&self) -> f64 {
         self.at_m(f64::INFINITY)
     }
@@ -134,11 +134,11 @@ pub enum Margin {
     Hidden,
     /// Heads that are not evenly phased, or that are side by side.
     Phase,
-    /// Beams that swing along the wall.
+    /// Beams that swing along the wall because the vehicle yaws or pitches.
     Swing,
     /// Uncertain position of the vehicle.
     Position,
-    /// Lost returns.
+    /// Returns that the heads lose by chance.
     Losses,
 }
 
@@ -193,7 +193,7 @@ impl Margins {
         Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, pass_error_m }
     }
 
-    /// Returns the speeds in the order of [`Margin::ALL`], m/s.
+    /// Returns the largest speeds in the order of [`Margin::ALL`], m/s.
     pub fn speeds_mps(&self) -> [f64; 6] {
         let Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, .. } = *self;
         [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps]
@@ -228,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn margin_is_a_limited_multiple_of_the_standard_deviation() {
+    fn position_margin_is_a_limited_multiple_of_the_standard_deviation() {
         let margin_m = |pass_error_m: f64, t_y_m: f64| position_margin_m(0.5, 2.0, pass_error_m, t_y_m);
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn margin_is_continuous() {
+    fn position_margin_is_continuous() {
         let mut before = position_margin_m(0.5, 2.0, 0.0, 0.3);
         for k in 1..=2000 {
             let now = position_margin_m(0.5, 2.0, 1e-4 * f64::from(k), 0.3);

@@ -18,13 +18,13 @@ pub enum Obstacle {
         /// The corner with the largest coordinates.
         most: Vec3<Body>,
     },
-    /// A capped cylinder.
+    /// A cylinder with flat ends.
     Cylinder {
         /// Centre of the first end.
         from: Vec3<Body>,
         /// Vector from the first end's centre to the other end's centre, m.
         along: Vec3<Body>,
-        /// Radius, m.
+        /// Radius of the cylinder, m.
         radius_m: f64,
     },
 }
@@ -72,7 +72,7 @@ impl AngleRange {
 }
 
 impl Obstacle {
-    /// The body of a head.
+    /// Returns the cylinder of a head's body.
     pub fn of_head(spec: &HeadSpec) -> Self {
         let along = |x_m| spec.mount.rotation * Vec3::new(x_m, 0.0, 0.0);
         Self::Cylinder {

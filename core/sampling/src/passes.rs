@@ -69,7 +69,7 @@ pub struct Passes {
     parallax_s: f64,
     /// Whether the vehicle is too slow for phases along the tunnel to have a meaning.
     at_rest: bool,
-    /// Whether extra passes are required for lost returns.
+    /// Whether extra passes over each place are required for lost returns.
     lossy: bool,
 }
 
@@ -315,7 +315,7 @@ impl Passes {
         Self { lossy, ..self }
     }
 
-    /// Whether extra passes are required for lost returns.
+    /// Whether extra passes over each place are required for lost returns.
     pub fn is_lossy(&self) -> bool {
         self.lossy
     }

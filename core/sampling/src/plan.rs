@@ -40,7 +40,7 @@ const FALLS: u32 = 12;
 /// The inspection to plan: a tunnel, a vehicle and tolerances of its pose.
 #[derive(Debug, Clone)]
 pub struct Inspection {
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: Profile,
     /// Length of tunnel to inspect, m.
     pub length_m: f64,
@@ -52,7 +52,7 @@ pub struct Inspection {
     pub hull: Vec<Obstacle>,
     /// Layout of the heads.
     pub layout: HeadLayout,
-    /// Tolerated drift of the vehicle, up, down and sideways, m.
+    /// Tolerated drift of the vehicle from its nominal position, up, down and sideways, m.
     pub drift_m: f64,
     /// Tolerated heading off the tunnel's axis, to either side, radians.
     pub yaw_rad: f64,
@@ -70,7 +70,7 @@ struct Stance {
     parallax_rad: f64,
     /// Largest difference between two heads' shifts along the tunnel that the heading causes, m.
     shift_m: f64,
-    /// Distance between the heads along the tunnel, m.
+    /// Distance along the tunnel between the planes in which the heads meet the wall, m.
     apart_m: f64,
 }
 

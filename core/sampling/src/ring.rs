@@ -39,7 +39,7 @@ pub struct Sounding {
 pub struct Footprint {
     /// Extent of the footprint in the head's scan plane, along the unrolled wall, m.
     pub in_plane_m: f64,
-    /// Extent of the footprint across the scan plane, m.
+    /// Extent of the footprint across the head's scan plane, m.
     pub across_m: f64,
 }
 
@@ -128,7 +128,7 @@ impl Sounding {
     }
 }
 
-/// Soundings of a whole turn at equal angles, with reusable buffers.
+/// Ray-cast soundings of a head's whole turn at equal angles, with reusable buffers.
 #[derive(Debug, Clone, Default)]
 pub struct Ring {
     soundings: Vec<Sounding>,
@@ -138,7 +138,7 @@ pub struct Ring {
     /// Values are negative if the head turns in the direction of falling arc length.
     way_m: Vec<f64>,
     perimeter_m: f64,
-    /// Angles and beam directions of the soundings, cached between casts.
+    /// Angles and beam directions of the soundings, cached for the next cast.
     beams: Vec<(f64, Vec3<Sensor>)>,
     /// Number of soundings between the pairs whose distances `steps_m` caches; zero if no distances are cached.
     stride: usize,

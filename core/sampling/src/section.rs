@@ -122,7 +122,7 @@ fn sin_of_multiple(m: u32, x_rad: f64) -> f64 {
     math::sin(high) + math::cos(high) * low
 }
 
-/// cos(a + b) for |a + b| < pi/2.
+/// Returns cos(a + b) for |a + b| < pi/2.
 fn cos_of_sum(a_rad: f64, b_rad: f64) -> Result<f64, SamplingError> {
     let high = a_rad + b_rad;
     // Rounding error of a sum of two doubles (Knuth's two-sum).
@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn formulas_equal_hand_computed_values() {
         let step = f64::to_radians(0.9);
-        // tan 0.9 deg = 0.015709; h = 4.571 m.
+        // The hand-computed values use tan 0.9 deg = 0.015709 and h = 4.571 m.
         assert!((t_y1_m(4.571, step).unwrap() - 0.071_807).abs() < 1e-6);
         assert!((t_y2_m(2.0, step, 50).unwrap() - 2.0 * (tan(50.0 * step) - tan(49.0 * step))).abs() < 1e-13);
         assert!((t_c_m(6.05, step).unwrap() - 0.095_032).abs() < 1e-6);
@@ -231,7 +231,7 @@ mod tests {
             prop_assert!(t_c_m(h, step).unwrap() < t_y1_m(h, step).unwrap());
         }
 
-        /// The mean of Eq. 8 equals the mean of its terms.
+        /// The mean step by Eq. 8 equals the mean of the single steps.
         #[test]
         fn mean_step_equals_the_mean_of_the_single_steps(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
             let m = u32::try_from(headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1).unwrap_or(0);

@@ -123,7 +123,7 @@ mod tests {
         assert!((one.pitch_m() - 1.576).abs() < 1e-12 && (one.t_x_m() - 1.576).abs() < 1e-12);
         let four = Spiral::new(0.197, fast, 4.0).unwrap();
         assert!((four.t_x_m() - 0.394).abs() < 1e-12);
-        // sqrt(0.39794^2 + 0.18^2)
+        // The expected T_max is sqrt(0.39794^2 + 0.18^2).
         assert!((four.t_max_m(0.18) - 0.436_756_6).abs() < 1e-6);
         assert!((one.t_y_mean_printed_m(0.085) - math::hypot(1.576, 0.085)).abs() < 1e-12);
         assert!((one.t_y_mean_m(0.085) - 0.085_091_3).abs() < 1e-6);

@@ -20,7 +20,7 @@ use thin::Thin;
 pub use limit::Going;
 pub use view::{Arc, PARTS, Sector, View};
 
-/// Width below which a strip is a rounding error, m.
+/// Width below which a strip of wall counts as a rounding error, m.
 const NO_WIDTH_M: f64 = 1e-9;
 
 /// A strip of the wall along the tunnel.
@@ -54,11 +54,11 @@ impl Strip {
 pub struct Bound {
     /// The largest speed, m/s; infinite if nothing limits it.
     pub speed_mps: f64,
-    /// T_y of the limiting strip, m.
+    /// T_y (largest distance between samples of a turn) on the strip that limits the speed, m.
     pub t_y_m: f64,
 }
 
-/// A strip that misses a target at a speed.
+/// A strip of the wall that misses a target at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
     /// Longest time between two passes over the strip, s, without extra passes for lost returns.
@@ -212,7 +212,7 @@ impl Strips {
         }
     }
 
-    /// The strips.
+    /// The strips of the wall, in order of arc length.
     pub fn as_slice(&self) -> &[Strip] {
         &self.strips
     }

@@ -100,7 +100,7 @@ impl Looks {
             while earlier.peek().is_some_and(|(then, _)| at.since(*then).0 < over.0) {
                 earlier.next();
             }
-            // If the duration exceeds the history, the oldest direction is used.
+            // If the duration exceeds the stored history, the oldest direction is used.
             let before = earlier.peek().map(|(_, before)| *before).or(oldest);
             turned_rad = turned_rad.max(before.map_or(0.0, |before| (*look + -before).norm()));
         }

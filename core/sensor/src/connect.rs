@@ -7,15 +7,15 @@ use crate::driver::Carrier;
 
 /// Default serial rate, baud.
 const USUAL_BAUD: u32 = 115_200;
-/// Highest serial rate accepted, baud.
+/// Highest accepted serial rate, baud.
 const MAX_BAUD: u32 = 12_000_000;
 
 /// A USB device, identified by its descriptors, which are the same on any port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbIdentity {
-    /// Vendor id.
+    /// USB vendor id.
     pub vendor: u16,
-    /// Product id.
+    /// USB product id.
     pub product: u16,
     /// Serial number, to distinguish devices of the same product.
     pub serial: Option<String>,
@@ -37,17 +37,17 @@ pub enum Connect {
     Serial {
         /// Serial port of the device.
         port: SerialPort,
-        /// Bits per second; 8 data bits, no parity, 1 stop bit.
+        /// Serial rate, bits per second; 8 data bits, no parity, 1 stop bit.
         baud: u32,
     },
     /// `tcp:HOST:PORT`: the host opens a connection to the device.
     Tcp {
-        /// Host name or address, and port.
+        /// Host name or address of the device, and its port.
         address: String,
     },
     /// `udp:HOST:PORT`: the host sends packets to the device and receives the answers.
     Udp {
-        /// Host name or address, and port.
+        /// Host name or address of the device, and its port.
         address: String,
     },
     /// `udp-listen:ADDRESS:PORT[?from=HOST[:PORT]]`: a local port to which the device sends.
@@ -59,18 +59,18 @@ pub enum Connect {
         /// Host of the device, optionally with its port; any host if `None`.
         from: Option<String>,
     },
-    /// `can:INTERFACE`.
+    /// `can:INTERFACE`: a CAN bus.
     Can {
-        /// Name of the network interface.
+        /// Name of the CAN network interface.
         interface: String,
     },
-    /// `hid:VID:PID[:SERIAL]`.
+    /// `hid:VID:PID[:SERIAL]`: a USB device of the class HID.
     Hid(UsbIdentity),
-    /// `i2c:/dev/i2c-1:0x40`.
+    /// `i2c:/dev/i2c-1:0x40`: a device on an I2C bus.
     I2c {
-        /// Device file of the bus.
+        /// Device file of the I2C bus.
         bus: String,
-        /// Address of the device, 7 bits.
+        /// Address of the device on the I2C bus, 7 bits.
         address: u8,
     },
 }
@@ -83,7 +83,7 @@ pub struct ConnectError {
     pub text: String,
     /// Description of the fault.
     pub problem: String,
-    /// Allowed forms, with an example.
+    /// Allowed forms of `connect`, with an example.
     pub allowed: String,
 }
 
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn error_names_the_fault_and_the_allowed_form() {
+    fn connect_error_names_the_fault_and_the_allowed_form() {
         for (text, named, right) in [
             ("", "it is empty", "tcp:HOST:PORT"),
             ("/dev/ttyUSB0", "no colon", "serial:/dev"),

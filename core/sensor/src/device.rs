@@ -28,7 +28,7 @@ pub struct SensorConfig {
     pub plugin: String,
     /// Connection, as written in the vehicle file.
     pub connect: String,
-    /// Mount on the vehicle.
+    /// Position and attitude of the sensor on the vehicle.
     pub mount: Mount,
     /// Delay from the time of validity of a value to the receive time of its first byte.
     pub latency: DurNs,
@@ -37,7 +37,7 @@ pub struct SensorConfig {
 /// Mount and kind of a sensor, for navigation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SensorInfo {
-    /// Mount on the vehicle.
+    /// Position and attitude of the sensor on the vehicle.
     pub mount: Mount,
     /// Kind of sensor.
     pub kind: SensorKind,
@@ -57,7 +57,7 @@ pub enum SensorKind {
     Head,
     /// An echosounder; readings below `min_confidence` are ignored.
     Echosounder {
-        /// Minimum confidence, 0 to 1.
+        /// Minimum confidence of a used reading, 0 to 1.
         min_confidence: f64,
     },
     /// A pressure sensor.
@@ -90,7 +90,7 @@ pub struct InertialNoise {
     pub force_bias: BiasSpec,
 }
 
-/// Bias of an inertial sensor, in its unit.
+/// Bias of an inertial sensor, in the sensor's unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasSpec {
     /// Standard deviation of the bias's constant part, which is set at power-on.
@@ -128,13 +128,13 @@ pub trait DeviceKind: Sync {
 
 /// Parts of a configured sensor that the loop uses.
 pub struct SensorSpec {
-    /// Common keys of the sensor's table in the vehicle file.
+    /// Values of the common keys in the sensor's table of the vehicle file.
     pub sensor: SensorConfig,
     /// Kind of sensor, for navigation.
     pub kind: SensorKind,
-    /// Decoder from bytes to readings.
+    /// Decoder from the sensor's bytes to readings.
     pub decoder: Box<dyn Decoder>,
-    /// Size of the ring buffer ahead of the loop, bytes.
+    /// Size of the ring buffer between the sensor's port and the loop, bytes.
     pub ring_bytes: usize,
 }
 
@@ -225,7 +225,7 @@ pub trait Decoder: Stateful + Send + Sync {
     /// Allocates: never.
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded));
 
-    /// Counters of the codec.
+    /// Counters of the decoder's codec.
     fn counts(&self) -> CodecCounts;
 
     /// Number of readings that were decoded but withheld.
@@ -291,7 +291,7 @@ pub trait Emulator<M>: Send + Sync {
     fn tell(&mut self, measured: &M, line: LineSink<'_>);
 }
 
-/// An emulated device with its type of measurement.
+/// An emulated device, by the type of its measurements.
 pub enum Emulated {
     /// A profiling head.
     Head(Box<dyn Emulator<Sounding>>),

@@ -64,7 +64,7 @@ pub struct ClockReport {
 /// Rate error against the host's clock, parts per million. Positive: the device's clock is fast.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Drift {
-    /// Rate error, parts per million.
+    /// Rate error of the device's clock, parts per million.
     pub ppm: f64,
     /// Standard deviation of the rate error, parts per million.
     pub sd_ppm: f64,
@@ -73,7 +73,7 @@ pub struct Drift {
 /// Tracks a device's clock. Allocates: never.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct DeviceClock {
-    /// Number of ticks after which the clock wraps.
+    /// Number of ticks after which the device's clock wraps.
     round: i128,
     tick: DurNs,
     stamps: u64,
@@ -89,7 +89,7 @@ pub struct DeviceClock {
 struct Epoch {
     /// Receive time of the epoch's first stamp, which is the zero of device time.
     begun: MonoNs,
-    /// The last stamp: raw ticks, unwrapped ticks, receive time.
+    /// The last device stamp: raw ticks, unwrapped ticks, receive time.
     raw: i128,
     elapsed_ticks: i128,
     received: MonoNs,
@@ -292,7 +292,7 @@ impl Edge {
         let between_ns = stamp.device_ns.saturating_sub(last.device_ns) as f64;
         let late_ns = stamp.late_ns.saturating_sub(last.late_ns) as f64 - self.slope * between_ns;
         let most_ns = MOST_SHIFT_NS + MOST_DRIFT * between_ns;
-        // The stamps of a clock that falls behind look delayed.
+        // If a clock falls behind, its stamps look delayed.
         if late_ns > most_ns {
             Shift::Behind
         } else if late_ns < -most_ns {

@@ -63,7 +63,7 @@ pub trait Wire {
 pub struct DeviceHealth {
     /// Number of valid messages from the device.
     pub good_frames: u64,
-    /// Identity that the device has reported.
+    /// Identity that the device has reported, if any.
     pub identity: Option<String>,
     /// Description of a fault, with its remedy.
     pub complaint: Option<String>,

@@ -9,7 +9,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// A simulated measurement of any kind of device.
 pub trait Measurement: Copy + Send + Sync + 'static {
-    /// True time of validity.
+    /// Returns the true time of validity of the measurement.
     fn at(&self) -> MonoNs;
 
     /// Sets the measurement's true time of validity.
@@ -29,19 +29,19 @@ pub struct Sounding {
     pub range_m: Option<f64>,
 }
 
-/// Water pressure at a depth sensor.
+/// Simulated water pressure at a depth sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressure {
-    /// Time of validity.
+    /// Time of validity of the pressure.
     pub at: MonoNs,
-    /// Absolute pressure, Pa.
+    /// Absolute pressure of the water, Pa.
     pub pressure_pa: f64,
 }
 
 /// A sample of an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inertia {
-    /// Time of validity.
+    /// Time of validity of the sample.
     pub at: MonoNs,
     /// Period between two samples.
     pub period: DurNs,
@@ -53,21 +53,21 @@ pub struct Inertia {
     pub force_mps2: Vec3<Sensor>,
 }
 
-/// Velocity over ground at a velocity log.
+/// Simulated velocity over ground at a velocity log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroundVelocity {
-    /// Time of validity.
+    /// Time of validity of the velocity.
     pub at: MonoNs,
     /// Velocity of the sensor itself, m/s, which includes the sensor's motion by the vehicle's rotation.
     pub velocity_mps: Vec3<Sensor>,
 }
 
-/// Cable paid out into the tunnel.
+/// Simulated length of cable paid out into the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Payout {
-    /// Time of validity.
+    /// Time of validity of the length.
     pub at: MonoNs,
-    /// Chainage reached by the cable, m.
+    /// Chainage that the cable's end has reached, m.
     pub chainage_m: f64,
 }
 

@@ -43,11 +43,11 @@ pub enum Reading {
     Pressure(WaterPressure),
     /// Orientation computed by the device: rotation from the sensor's frame to the level frame.
     Attitude(Rot<Level, Sensor>),
-    /// Turn rate, rad/s.
+    /// Turn rate of the sensor, rad/s.
     AngularRate(Vec3<Sensor>),
     /// Acceleration minus gravity (specific force), m/s^2; +9.8 along z if the sensor is at rest and level.
     SpecificForce(Vec3<Sensor>),
-    /// Velocity over ground, m/s.
+    /// Velocity of the sensor over ground, m/s.
     VelocityOverGround(Vec3<Sensor>),
     /// Length of cable paid out, or another measure of the distance travelled.
     TetherLength(TetherLength),
@@ -98,7 +98,7 @@ pub struct SonarReturn {
 pub struct EchoRange {
     /// Distance computed by the device, m; `None` if it found no echo.
     pub range_m: Option<f64>,
-    /// The device's confidence, 0 to 1.
+    /// The device's confidence in the distance, 0 to 1.
     pub confidence: f64,
     /// Speed of sound used by the device to compute the range, m/s.
     pub sound_speed_mps: f64,
@@ -107,7 +107,7 @@ pub struct EchoRange {
 /// Absolute pressure of the water.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WaterPressure {
-    /// Absolute pressure, Pa.
+    /// Absolute pressure of the water, Pa.
     pub pressure_pa: f64,
     /// Quantum (resolution step) of the pressure, Pa.
     pub resolution_pa: f64,
@@ -115,7 +115,7 @@ pub struct WaterPressure {
     pub temperature_degc: f64,
 }
 
-/// Cable paid out.
+/// A reading of a cable counter: length of cable paid out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TetherLength {
     /// Length counted since the counter's zero, m; increases as the vehicle goes in.
@@ -126,7 +126,7 @@ pub struct TetherLength {
     pub restart: Option<CountRestart>,
 }
 
-/// A restart of the count from zero.
+/// A restart of the cable counter's count from zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CountRestart {
     /// Number of the restart, from 1.

@@ -21,7 +21,7 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
 
-/// Duration of the alignment.
+/// Duration of the filter's alignment.
 pub const LISTENS: DurNs = DurNs(1_000_000_000);
 /// Maximum number of echoes kept per echosounder; the median of their ranges is used.
 const ECHOES: usize = 9;
@@ -60,7 +60,7 @@ pub struct Listening {
 
 stateful!(Listening { state: since, before, hears_wall, attitude, force, told, height_m; slots: echoes; });
 
-/// A cable reading.
+/// A reading of the cable counter.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Told {
     at: MonoNs,
@@ -93,7 +93,7 @@ impl Default for Listening {
 }
 
 impl Listening {
-    /// Adds a reading.
+    /// Adds a sensor reading to the alignment.
     pub fn hear(
         &mut self,
         context: &Context,
@@ -161,7 +161,7 @@ impl Listening {
         }
     }
 
-    /// Returns the start of the alignment, as a time of validity.
+    /// Returns the start time of the alignment, as a time of validity.
     pub fn since(&self) -> Option<MonoNs> {
         self.since
     }

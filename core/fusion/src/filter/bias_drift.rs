@@ -25,7 +25,7 @@ const AT_FIRST: f64 = 1e3;
 const MOST_RATE: f64 = 4.3e-4;
 const MOST_FORCE: f64 = 4.1e-3;
 
-/// Factors of the process noise of gyro and accelerometer biases.
+/// Learnt factors that multiply the process noise of gyro and accelerometer biases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BiasDrift([Ratio; 2]);
 

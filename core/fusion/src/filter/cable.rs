@@ -12,7 +12,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Averaging time of innovations, s.
+/// Averaging time of the cable counter's innovations, s.
 const RECENT_S: f64 = 1.0;
 /// Mean innovation at which counter and estimate disagree, as a multiple of the mean's sd for white innovations.
 ///
@@ -67,7 +67,7 @@ pub struct CableDoubt {
 /// A cable reading compared with the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CableReading {
-    /// Time of validity.
+    /// Time of validity of the reading.
     pub at: MonoNs,
     /// Chainage shown by the counter, m.
     pub shown_m: f64,
@@ -92,9 +92,9 @@ impl CableReading {
 /// Decision about the use of a cable reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Use {
-    /// Fuse the reading.
+    /// Fuse the cable reading.
     Fuse,
-    /// Ignore the reading.
+    /// Ignore the cable reading.
     Withhold,
     /// Counter and estimate disagree: ignore readings from now on, and revert the counter's last corrections.
     ///
@@ -115,16 +115,16 @@ pub struct Cable {
     changed: Option<CableReading>,
     /// The first of the present series of readings beyond the gate.
     left: Option<CableReading>,
-    /// Recent effect of the counter's readings on the estimate.
+    /// Recent corrections of the estimate by the counter's readings.
     pub corrections: CounterCorrections,
-    /// Running mean of the innovations, in standard deviations.
+    /// Running mean of the cable counter's innovations, in standard deviations.
     mean_sds: f64,
     dispute: Option<Dispute>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Dispute {
-    /// The first withheld reading.
+    /// The first cable reading that was withheld from the filter.
     first: CableReading,
     /// First reading of the present series in which the counter follows the vehicle's motion.
     same_from: CableReading,

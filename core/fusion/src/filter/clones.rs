@@ -17,7 +17,7 @@ use crate::relative::Relative;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Time between two clones.
+/// Time between two clones of the filter's errors.
 pub const STEP: DurNs = DurNs(2_000_000_000);
 /// Number of clones kept. Together they cover over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
@@ -56,7 +56,7 @@ impl Moment {
 /// Clones of earlier errors, for relative covariances.
 #[derive(Debug, Clone)]
 pub struct ErrorClones {
-    /// Clones, in a ring buffer.
+    /// Clones of earlier errors, in a ring buffer.
     clones: Vec<Moment>,
     count: usize,
     /// Columns of the matrix that propagates errors from the newest clone to the present.

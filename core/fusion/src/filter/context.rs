@@ -10,7 +10,7 @@ use headrace_geometry::tunnel::Profile;
 /// Design, site and settings of a dive.
 #[derive(Debug, Clone)]
 pub struct Context {
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: Profile,
     /// Water and location of the tunnel.
     pub site: Site,

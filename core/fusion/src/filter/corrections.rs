@@ -42,7 +42,7 @@ pub struct CounterCorrections {
     sums: [f64; 2],
     /// Standard deviations of the correction sums that the filter's covariance predicts, m and m/s.
     by_chance: [f64; 2],
-    /// Time for which the count has been stationary, s.
+    /// Time for which the cable count has not changed, s.
     stood_s: f64,
     /// Standard deviations of the length lost if the wheel has stuck, m: since the count became stationary, and
     /// between two head passes.

@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn one_garbled_reading_does_not_change_the_step() {
+    fn one_garbled_reading_does_not_change_the_counter_step() {
         let mut step = CountStep::default();
         for k in 0..6000_u32 {
             let t = f64::from(k) / 50.0;

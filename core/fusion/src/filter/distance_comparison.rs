@@ -62,9 +62,9 @@ pub(super) struct DistanceComparison {
     estimate: Vec<(MonoNs, [f64; 1])>,
     /// Source number of the velocity log that is compared.
     log_source: Option<usize>,
-    /// Last attitude from an inertial unit.
+    /// Last attitude measured by an inertial unit.
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
-    /// Rows of distances, m; NaN for a missing distance.
+    /// Rows of the distances by each source at one time, m; NaN for a missing distance.
     rows: Vec<(MonoNs, [f64; 3])>,
     /// Times since which the cable's distance has differed from the velocity log's, and from the estimate's.
     since: [Option<MonoNs>; 2],
@@ -76,7 +76,7 @@ pub(super) struct DistanceComparison {
 stateful!(DistanceComparison { state: log_source, attitude, since, doubt, ties; lists: cable, log, estimate, rows; });
 
 impl Default for DistanceComparison {
-    /// Allocates the buffers, without readings.
+    /// Creates the comparison with allocated buffers, but no readings.
     fn default() -> Self {
         let readings = || Vec::with_capacity(READINGS);
         let rows = Vec::with_capacity(ROOM);
@@ -313,7 +313,7 @@ mod tests {
                 let moved = Vec3::new(along_mps, 0.02, 0.0);
                 ways.hear(at(t), DVL, &log, &Reading::VelocityOverGround(moved), &site);
             }
-            // An epoch lasts a tenth of a second.
+            // An epoch of this test lasts a tenth of a second.
             if k.is_multiple_of(rate_hz / 10) {
                 ways.compare(at(t - 0.2), estimate_m(t - 0.2), 1, &settings);
             }

@@ -70,7 +70,7 @@ const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 /// Maximum number of recorded steps in an epoch: the propagation, two additions to the covariance, and an end.
 const STEPS: usize = 4;
 
-/// The estimate at one time, with its covariance.
+/// The filter's estimate at one time, with its covariance.
 #[derive(Debug, Clone)]
 pub struct Eskf {
     /// Time of the estimate. All earlier readings have been fused.
@@ -109,11 +109,11 @@ pub struct Eskf {
     pub is_at_rest: bool,
     /// Whether inertial data were missing in the last epoch. The motion is then a guess, and no noise is learnt.
     is_blind: bool,
-    /// Checks of settings against the ranges.
+    /// Checks of settings by the residuals of ranges.
     pub suspicions: SettingChecks,
     /// Variances to add to the errors at the end of the epoch, because the estimate may be wrong.
     doubts: Errors,
-    /// Steps of the last epoch, for smoothing; empty unless `keeps_steps`.
+    /// Filter steps of the last epoch, for smoothing; empty unless `keeps_steps`.
     pub steps: Vec<Step>,
     keeps_steps: bool,
 }
@@ -161,7 +161,7 @@ impl Eskf {
         self.keeps_steps = true;
     }
 
-    /// Starts with a first estimate and its covariance.
+    /// Starts the filter with a first estimate and its covariance.
     pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
         (self.at, self.state, self.factors) = (at, state, factors);
         self.clones.clear();

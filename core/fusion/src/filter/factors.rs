@@ -66,7 +66,7 @@ impl<const N: usize> Factors<N> {
         columns.map(|(column, d)| at(column, i) * d * at(column, j)).sum()
     }
 
-    /// Variance of one error.
+    /// Variance of the error `i`.
     pub fn variance(&self, i: usize) -> f64 {
         self.covariance(i, i)
     }
@@ -173,7 +173,7 @@ impl<const N: usize> Factors<N> {
         sum
     }
 
-    /// Multiplies a row by U.
+    /// Multiplies a row vector by the factor U.
     fn through(&self, row: &[f64; N]) -> [f64; N] {
         core::array::from_fn(|j| self.u.get(j).map_or(0.0, |column| dot(column, row, j + 1)))
     }
@@ -233,7 +233,7 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// Adds noise with this variance to one error.
+    /// Adds noise with this variance to the error `i`.
     pub fn add_to(&mut self, i: usize, variance: f64) {
         self.add_all([Noise::of_one(i, variance)]);
     }

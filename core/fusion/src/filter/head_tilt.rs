@@ -193,7 +193,7 @@ mod tests {
 
     /// The oracle is a least-squares fit to the readings themselves, for two unknowns by Cramer's rule.
     #[test]
-    fn tilt_and_certainty_equal_those_of_a_least_squares_fit() {
+    fn head_tilt_and_its_certainty_equal_a_least_squares_fit() {
         let weight = 1.0 / (NOISE_M * NOISE_M);
         let square = |x: f64| x * x;
         for (tilt_rad, steady) in [(0.05, 0.02), (-0.08, -0.1), (0.2, 0.3)] {

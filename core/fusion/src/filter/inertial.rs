@@ -47,7 +47,7 @@ pub struct Leg {
     blind_s: [f64; 2],
     /// Distance along the tunnel, m, and the cable's scale error on it; their product is the creep.
     creeping: [f64; 2],
-    /// Factors for the process noise of gyro and accelerometer biases.
+    /// Factors that multiply the process noise of gyro and accelerometer biases.
     unrest: [f64; 2],
     /// Standard deviation, m, and time constant, s, of the cable's slack.
     slack: [f64; 2],
@@ -297,7 +297,7 @@ pub struct Transition {
     way_turned: Matrix3<f64>,
     /// Distance along the tunnel, m, and the cable's scale error on it.
     creeping: [f64; 2],
-    /// Indices of the errors that decay, each with its decay factor.
+    /// Indices of the errors that decay over time, each with its decay factor.
     fading: [(usize, f64); 9],
 }
 

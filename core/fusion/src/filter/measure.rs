@@ -15,7 +15,7 @@ use headrace_geometry::tunnel::Profile;
 /// If the hull is pitched steeply, the beams look along the tunnel, and only few of them determine the attitude.
 const SQUARE: f64 = 0.8;
 
-/// A scalar measurement.
+/// A scalar measurement of the filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScalarUpdate {
     /// Change of the expected value per unit of each error.

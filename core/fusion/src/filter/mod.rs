@@ -101,7 +101,7 @@ pub struct FilterNavigation {
     is_running: bool,
     /// Start of the first epoch. Later epochs begin at whole multiples of the epoch length after it.
     epoch_zero: MonoNs,
-    /// Latest receive time.
+    /// Latest receive time of any reading.
     received: MonoNs,
     /// Estimates after the last epoch, propagated by inertial samples.
     ahead: Vec<(MonoNs, State)>,

@@ -186,7 +186,7 @@ mod tests {
 
     /// Rejected innovations show that the wall differs from its design. One stray echo in twenty changes little.
     #[test]
-    fn rejected_innovations_have_limited_weight() {
+    fn rejected_innovations_have_limited_weight_in_the_noise_level() {
         near(level(2000, |_| 9.0, false).share(), 1.0);
         let mut one = level(1000, alternating(0.5), true);
         for k in 0..200 {

@@ -26,7 +26,7 @@ pub(super) struct PoseWindow {
 }
 
 impl PoseWindow {
-    /// Adds the information of a reading on the vehicle's pose.
+    /// Adds the information that a reading gives on the vehicle's pose.
     pub(super) fn add(&mut self, by_pose: [f64; POSE], residual_m: f64, weight: f64) {
         for ((by, line), sum) in by_pose.iter().zip(&mut self.pose).zip(&mut self.residuals) {
             for (part, other) in line.iter_mut().zip(&by_pose) {

@@ -110,7 +110,7 @@ mod tests {
             (0..returns).for_each(|_| _ = seen.noise_m2(6.0, DECLARED_M2, 0.5, &settings));
             seen.passes(&settings)
         };
-        // A turn has 120 returns.
+        // A turn of a head has 120 returns.
         let passes = [(0, 7.0), (120, 7.01), (240, 7.0), (60, 7.06), (0, 7.03), (0, 7.0)]
             .map(|(n, x_m)| after(n, x_m));
         for (found, right) in passes.iter().zip([1.0, 1.5, 3.5, 1.0, 1.0, 1.0]) {

@@ -27,7 +27,7 @@ const FACING: f64 = -0.95;
 /// Maximum time between two opposite pings whose ranges are added, s.
 const AT_ONCE_S: f64 = 0.25;
 
-/// A fused ping.
+/// An echosounder's ping that has been fused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Look {
     /// Source number of the echosounder.
@@ -144,7 +144,7 @@ mod tests {
     /// The roughness is found although the vehicle sways. A smooth wall is recognised even if it is declared as
     /// rough.
     #[test]
-    fn roughness_equals_the_excess_variation_of_the_range_sum() {
+    fn wall_roughness_equals_the_excess_variation_of_opposite_range_sums() {
         for rough_m in [0.0, 0.01, 0.03, 0.05] {
             for white_m in [0.0, 0.02] {
                 let found_m = found_m(rough_m, white_m, 0.0, 400.0);
@@ -158,7 +158,7 @@ mod tests {
     ///
     /// The learnt roughness is at most twice the declared one.
     #[test]
-    fn roughness_is_as_declared_until_observed() {
+    fn wall_roughness_is_as_declared_until_observed() {
         let settings = Settings::default();
         assert!((found_m(0.05, 0.0, 0.1, 100.0) - settings.echo_sd_m).abs() < 1e-12);
         assert!((found_m(1.0, 0.0, 0.0, 400.0) - 2.0 * settings.echo_sd_m).abs() < 1e-12);

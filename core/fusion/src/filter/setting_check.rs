@@ -37,7 +37,7 @@ const SPELL: DurNs = DurNs(2_000_000_000);
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
-/// Minimum number of readings in a block.
+/// Minimum number of readings in a block of pose windows.
 const FEWEST_READINGS: u32 = 100;
 /// Smallest setting errors that are reported: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
@@ -67,7 +67,7 @@ pub enum Setting {
     HeadPitched(f64),
     /// A head is yawed on its mount by this angle, radians, which is to be added to the configured yaw.
     HeadYawed(f64),
-    /// A source faces the opposite direction.
+    /// A sensor is mounted facing the opposite direction.
     WrongWayRound,
     /// Two sources are swapped; the value is the number of the second source.
     Swapped(u16),
@@ -80,7 +80,7 @@ pub struct SettingDoubt {
     pub setting: Setting,
     /// Number of the source to which the setting belongs, if it belongs to one source.
     pub source: Option<u16>,
-    /// Distance from the configured value, in standard deviations.
+    /// Distance of the setting from its configured value, in standard deviations.
     pub sure_sd: f64,
 }
 
@@ -137,7 +137,7 @@ impl SettingDoubt {
 /// Context for the prediction of ranges.
 #[derive(Debug, Clone, Copy)]
 pub struct Design<'a> {
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: &'a Profile,
     /// Water and location of the tunnel.
     pub site: &'a Site,
@@ -185,7 +185,7 @@ pub struct SettingChecks {
 stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, doubt; lists: alternatives; });
 
 impl Default for SettingChecks {
-    /// Allocates the buffers, without readings.
+    /// Creates the checks with allocated buffers, but no readings.
     fn default() -> Self {
         Self {
             block: Block::default(),
@@ -355,7 +355,7 @@ impl SettingChecks {
         }
     }
 
-    /// Ends a block, and adds its sums to the fits.
+    /// Ends a block of pose windows, and adds its sums to the fits of settings.
     fn close(&mut self) {
         self.end_spell();
         if self.block.readings >= FEWEST_READINGS {

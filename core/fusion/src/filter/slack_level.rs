@@ -32,7 +32,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 const LAGS_S: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Capacity for differences between counter and inertial motion: ten a second over three of the longest lags.
 const ROOM: usize = 256;
-/// Capacity for the inertial samples of an epoch.
+/// Maximum number of inertial samples in an epoch.
 const KNOTS: usize = 256;
 /// Averaging time for the mean squares of third differences, s.
 const MEMORY_S: f64 = 40.0;
@@ -75,14 +75,14 @@ const GAP: DurNs = DurNs(1_500_000_000);
 const LEAST_TIME_S: f64 = 0.15;
 pub(super) const MOST_REACH_M: f64 = 0.15;
 
-/// Estimate of the slack from third differences.
+/// Estimate of the cable's slack from third differences.
 #[derive(Debug, Clone)]
 pub(super) struct SlackEstimate {
     attitude: Option<Rot<Tunnel, Body>>,
     /// Inertial position and velocity along the tunnel, each up to an unknown constant.
     way_m: f64,
     speed_mps: f64,
-    /// Inertial positions within the last epoch.
+    /// Inertial positions along the tunnel within the last epoch.
     knots: Vec<(MonoNs, [f64; 1])>,
     /// Differences between counter and inertial position, m, each with the counter's reading, m.
     differences: Vec<(MonoNs, [f64; 2])>,
@@ -98,7 +98,7 @@ pub(super) struct SlackEstimate {
 stateful!(SlackEstimate { state: attitude, way_m, speed_mps, squares_m2, means_m, seen, compared, slack; lists: knots, differences; });
 
 impl Default for SlackEstimate {
-    /// Allocates the buffers, without readings.
+    /// Creates the estimate with allocated buffers, but no readings.
     fn default() -> Self {
         Self {
             attitude: None,

@@ -21,13 +21,13 @@ const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
 /// Minimum time between two attitude readings that are used. Their errors stay correlated for longer than this.
 ///
-/// The constants for cable readings and depths have the same reason.
+/// The periods for cable, depth and velocity readings have the same reason.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
-/// See [`ATTITUDE_PERIOD`].
+/// Minimum time between two used cable readings; see [`ATTITUDE_PERIOD`].
 pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
-/// See [`ATTITUDE_PERIOD`].
+/// Minimum time between two used depth readings; see [`ATTITUDE_PERIOD`].
 pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
-/// See [`ATTITUDE_PERIOD`].
+/// Minimum time between two used velocity readings; see [`ATTITUDE_PERIOD`].
 pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
 /// Number of velocity readings that share one error: errors of the log's scale, mount and bottom track last for 10
 /// s.
@@ -60,7 +60,7 @@ pub struct Consistency {
 }
 
 impl Consistency {
-    /// Counts an innovation as used or rejected.
+    /// Counts an innovation of a fused or rejected measurement.
     pub fn count(&mut self, nis: f64, gate: f64, variance: f64, usual: f64) {
         self.surprise += nis.min(gate) - 1.0 + math::ln(variance / usual);
         if nis <= gate {
@@ -77,7 +77,7 @@ impl Consistency {
     }
 }
 
-/// The filter's record of one source.
+/// The filter's record of one sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// Mount and kind of the sensor.
@@ -86,17 +86,17 @@ pub struct Source {
     pub consistency: Consistency,
     /// Time of the last reading that was put into the reordering window.
     pub taken: Option<MonoNs>,
-    /// Rotation of a head.
+    /// Rotation of the sensor if it is a head.
     pub turning: Turning,
     /// Learnt noise level of the sensor.
     pub noise_level: NoiseLevel,
-    /// Resolution step of a tether counter.
+    /// Resolution step of the sensor if it is a tether counter.
     pub count_step: CountStep,
     /// Record that shows whether the range of a head follows the wall.
     pub one_range: ConstantRange,
 }
 
-/// Rotation of a head.
+/// Measured rotation of a head, and its last used angle.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Turning {
     last: Option<(MonoNs, f64)>,
@@ -105,7 +105,7 @@ pub struct Turning {
 }
 
 impl Source {
-    /// Creates a source without readings.
+    /// Creates the record of a sensor without readings.
     pub fn new(sensor: SensorInfo) -> Self {
         Self {
             sensor,
@@ -220,7 +220,7 @@ mod tests {
         }
         assert_eq!((consistency.used, consistency.gated), (3, 2));
         assert_eq!(consistency.nis(), Some(4.0));
-        // Innovations are clipped at the gate.
+        // The statistics clip innovations at the gate.
         assert!((consistency.surprise - (0.5 + 9.0 + 2.5 + 9.0 + 9.0 - 5.0)).abs() < 1e-12);
     }
 }

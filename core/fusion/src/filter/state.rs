@@ -40,7 +40,7 @@ pub const STATE_NUMBERS: usize = ERRORS + 1;
 /// `docs/why/navigation.md`.
 pub type Errors = [f64; ERRORS];
 
-/// The estimated state.
+/// The estimated state of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Position of the inertial unit.
@@ -205,7 +205,7 @@ impl State {
         })
     }
 
-    /// Whether every number is finite.
+    /// Whether every number of the state is finite.
     pub fn is_sound(&self) -> bool {
         let cable = [self.creep_m, self.slack_m, self.slack_rate_mps, self.scale];
         let offsets = [self.depth_offset_m, self.heading_offset_rad, self.range_scale];
@@ -265,7 +265,7 @@ pub fn rotation_vector<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Vec3<To
     v.scaled(share)
 }
 
-/// Returns the matrix of a rotation.
+/// Returns the 3 x 3 matrix of a rotation.
 pub fn matrix<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Matrix3<f64> {
     *UnitQuaternion::to_rotation_matrix(rotation.0).matrix()
 }

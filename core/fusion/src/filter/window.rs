@@ -22,12 +22,12 @@ const SPEAKS_FOR: DurNs = DurNs(100_000_000);
 /// mean of a burst applies to the whole time since the sample before it.
 const SAME: DurNs = DurNs(500_000);
 
-/// A waiting reading.
+/// A reading that waits in the window.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Waiting {
-    /// Time of validity.
+    /// Time of validity of the reading.
     pub at: MonoNs,
-    /// Number of the source.
+    /// Number of the reading's source.
     pub source: usize,
     /// The reading.
     pub reading: Reading,
@@ -173,14 +173,14 @@ impl Window {
         self.felt.get(self.felt.partition_point(|felt| felt.at <= at)).map(|felt| felt.at)
     }
 
-    /// Removes all readings and samples.
+    /// Removes all waiting readings and inertial samples.
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.felt.clear();
         self.jolt = None;
     }
 
-    /// Removes readings valid at or before `at`.
+    /// Removes waiting readings valid at or before `at`.
     pub fn drop_until(&mut self, at: MonoNs) {
         let old = self.waiting.partition_point(|waiting| waiting.at <= at);
         self.waiting.drain(..old);

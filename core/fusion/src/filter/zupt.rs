@@ -59,7 +59,7 @@ struct Means {
     count: f64,
     first: Option<[f64; 3]>,
     alike: u32,
-    /// Latest mean, until [`RestDetector::take_mean_rate`] takes it.
+    /// Latest mean of a window, until [`RestDetector::take_mean_rate`] takes it.
     latest: Option<[f64; 3]>,
 }
 

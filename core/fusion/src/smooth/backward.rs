@@ -11,10 +11,10 @@ use crate::filter::state::{ERRORS, State};
 use crate::relative::Relative;
 use headrace_geometry::time::MonoNs;
 
-/// A smoothed estimate.
+/// An estimate of the filter after smoothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Time of the estimate.
+    /// Time of the smoothed estimate.
     pub at: MonoNs,
     /// The smoothed state.
     pub state: State,

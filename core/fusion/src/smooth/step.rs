@@ -36,20 +36,20 @@ pub struct Step {
     pub at: MonoNs,
     /// End time of the step.
     pub to: MonoNs,
-    /// Estimate at the beginning.
+    /// Estimate at the beginning of the step.
     pub state: State,
     /// Covariance of the errors of `state`.
     pub factors: Factors<ERRORS>,
-    /// Change during the step.
+    /// Change of the estimate during the step.
     pub by: Move,
-    /// Predicted estimate at the end, before the measurements at that time.
+    /// Predicted estimate at the end of the step, before the measurements at that time.
     pub predicted: State,
 }
 
-/// A step with its context in the dive.
+/// A step of the filter with its context in the dive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
-    /// The step.
+    /// The step of the filter.
     pub step: Step,
     /// Position of the inertial unit on the vehicle, m. The estimate refers to this position.
     pub unit_at: Vec3<Body>,
@@ -62,7 +62,7 @@ pub struct Placed {
 }
 
 impl Step {
-    /// Whether all numbers are finite and no variance is negative.
+    /// Whether all numbers of the step are finite and no variance is negative.
     pub fn is_sound(&self) -> bool {
         self.state.is_sound() && self.predicted.is_sound() && self.factors.is_sound()
     }
@@ -85,7 +85,7 @@ impl Move {
         }
     }
 
-    /// Returns the covariance predicted for the end, bit-identical to the filter's.
+    /// Returns the covariance predicted for the end of the step, bit-identical to the filter's.
     pub fn predict(&self, settings: &Settings, factors: &Factors<ERRORS>) -> Factors<ERRORS> {
         let mut predicted = *factors;
         if let Self::Leg(leg) = self {

@@ -278,7 +278,7 @@ mod tests {
             let off_m = [place.x() - (0.5 * t - ahead_m), place.y() - (1.0 - aside_m), place.z() - 2.0];
             assert!(off_m.iter().all(|off_m| off_m.abs() < 1e-9), "{t}: {place:?}");
             assert!(rotation_vector(fix.pose.attitude * turned(0.2 * t).inverse()).norm() < 1e-9, "{t}");
-            // The relative variance grows from 0.01 to 0.04 m^2.
+            // In the first drive, the relative variance grows from 0.01 to 0.04 m^2.
             let variance_m2 = 0.01 + 0.015 * t.min(2.0);
             assert!((fix.relative.sd_m(Vec3::zero()) - math::sqrt(variance_m2)).abs() < 1e-9, "{t}");
             // At the inertial unit's position, the errors of the two visits are independent.

@@ -105,7 +105,7 @@ fn table(all: &[(Recipe, Tally)]) {
 }
 
 #[test]
-fn errors_are_within_5_sd_or_reported() {
+fn navigation_errors_are_within_5_sd_or_reported() {
     let all = dives(FEW, Recipe::of);
     table(&all);
     let silent = |is_declared: bool| {

@@ -17,7 +17,7 @@ const SETTLED_S: f64 = 10.0;
 const COMPARED_S: f64 = 20.0;
 /// Time between two passes of the heads over the same position, s.
 const PASS_S: f64 = 2.2;
-/// Errors beyond this many standard deviations must be reported.
+/// Errors of the estimate beyond this many standard deviations must be reported.
 const FAR_SDS: f64 = 5.0;
 /// Limit for twice the standard deviation between head passes, m; above it, the loop reports a doubtful position.
 ///

@@ -56,12 +56,12 @@ pub(crate) enum Fault {
 /// Behaviour of the velocity log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Log {
-    /// There is no log.
+    /// There is no velocity log.
     None,
     Sound,
-    /// The log repeats its last reading for a while.
+    /// The velocity log repeats its last reading for a while.
     Hangs,
-    /// The log always shows a fifth too much.
+    /// The velocity log always shows a fifth too much.
     Scaled,
     /// For a while, the log follows silt that drifts at 0.15 m/s.
     Drifts,
@@ -233,7 +233,7 @@ impl Recipe {
 /// Function that adds the readings of a source. Inputs: period, s, phase, s, source, and its reading at a time, s.
 type Every<'a> = dyn FnMut(f64, f64, usize, &mut dyn FnMut(f64) -> Option<Reading>) + 'a;
 
-/// A sum of sines, each with amplitude, angular frequency and phase.
+/// A sum of sine functions of time, each with amplitude, angular frequency and phase.
 type Sines = Vec<(f64, f64, f64)>;
 
 fn value(sines: &Sines, t: f64) -> f64 {
@@ -493,7 +493,7 @@ impl Dive {
     }
 }
 
-/// Returns the distance along the tunnel at times [`STEP_S`] apart, m.
+/// Returns the vehicle's true distance along the tunnel at times [`STEP_S`] apart, m.
 fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
     let steps = (recipe.duration_s / STEP_S) as usize + 4;
     let speed = recipe.speed_mps;

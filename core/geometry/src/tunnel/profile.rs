@@ -24,7 +24,7 @@ pub use plane::Yz;
 const SAME_POINT_M: f64 = 1e-9;
 /// Number of elements above which a polygon has a table of its extent by direction.
 const MANY: usize = 256;
-/// Number of places that [`Profile::places`] returns.
+/// Number of equidistant wall places that [`Profile::places`] returns.
 const PLACES: u32 = 64;
 
 /// A design profile. Arc length grows from the floor's centre via the left wall, in [0, perimeter).
@@ -77,7 +77,7 @@ pub enum ProfileError {
     NotStarShaped {
         /// Index of the input piece, or of the polygon point at which the offending edge begins.
         vertex: usize,
-        /// The reference point.
+        /// The reference point of the profile.
         reference: Yz,
     },
     /// All of the polygon lies on one side of y = 0.
@@ -90,7 +90,7 @@ pub enum ProfileError {
     Winding {
         /// Number of turns of the curve about the reference point.
         turns: i64,
-        /// The reference point.
+        /// The reference point of the profile.
         reference: Yz,
     },
 }
@@ -157,7 +157,7 @@ impl Profile {
         Ok(profile)
     }
 
-    /// Length of the closed curve, m.
+    /// Length of the profile's closed curve, m.
     pub fn perimeter_m(&self) -> f64 {
         self.perimeter_m
     }
@@ -167,7 +167,7 @@ impl Profile {
         self.reference
     }
 
-    /// Whether `point` is inside the curve.
+    /// Whether `point` is inside the profile's curve.
     pub fn contains(&self, point: Yz) -> bool {
         let direction = sub(point, self.reference);
         if direction == [0.0, 0.0] {
@@ -274,7 +274,7 @@ impl Profile {
         self.elements.iter().map(|element| (element.arc_m, element.length_m))
     }
 
-    /// Arc lengths of the element boundaries, m.
+    /// Arc lengths of the boundaries between the profile's lines and arcs, m.
     #[cfg(test)]
     pub(crate) fn corners_m(&self) -> Vec<f64> {
         self.elements.iter().map(|element| element.arc_m).collect()

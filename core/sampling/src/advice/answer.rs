@@ -1,4 +1,4 @@
-//! Speed advice and its parts.
+//! Speed advice, with its reason, remedy and alternatives.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,9 +18,9 @@ pub enum Reason {
     /// The cause is the distance between neighbouring samples of one turn, the width of a strip that no head sees, or
     /// the swing of the beams.
     AngularStep,
-    /// No advice is possible without position and heading.
+    /// No advice is possible, because position or heading is missing.
     NoHeadingOrFix,
-    /// No head delivers returns.
+    /// No advice is possible, because no head delivers returns.
     NoReturns,
 }
 
@@ -121,7 +121,7 @@ impl Remedy {
 /// Alternative to the present mode: the largest speed with all heads in another mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
-    /// The mode.
+    /// The mode to which all heads would be set.
     pub mode: ModeName,
     /// The largest speed that meets the target with the heads started in phase, m/s.
     ///
@@ -160,7 +160,7 @@ impl Left {
     }
 }
 
-/// Speed advice.
+/// Speed advice to the pilot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Advice {
     /// The largest speed at which sections will pass, m/s; zero if there is none.
@@ -173,7 +173,7 @@ pub struct Advice {
     ///
     /// `None` if the present speed meets the target, or if no speed near the present one meets it.
     pub nearest_mps: Option<f64>,
-    /// The limiting factor.
+    /// The limiting factor of the advice.
     pub reason: Reason,
     /// T_max predicted at the present speed, m; `None` if it cannot be predicted or is unbounded.
     pub predicted_t_m: Option<f64>,
@@ -183,13 +183,13 @@ pub struct Advice {
     ///
     /// The predicted T then exceeds the target minus the margin for position errors.
     pub may_exceed: bool,
-    /// Target minus the margin for position errors, m.
+    /// Target T minus the margin for position errors, m.
     pub sure_m: f64,
     /// The longest time between two head passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
     /// The longest time between two head passes if the passes were evenly spread, seconds.
     pub even_pass_gap_s: f64,
-    /// The largest distance between neighbouring samples of one turn, m.
+    /// T_y: the largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
     /// Time between two pings of a head, seconds; the longest of any head.
     pub ping_period_s: f64,

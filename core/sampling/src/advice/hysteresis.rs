@@ -1,4 +1,4 @@
-//! Hysteresis of the displayed advice, against flicker.
+//! Hysteresis of the displayed advice, so that the display does not flicker.
 
 use super::answer::{Advice, Reason};
 use super::search::SPEED_MARGIN;
@@ -51,7 +51,7 @@ pub struct Hysteresis {
 stateful!(Hysteresis { state: held, next, begun, will_exceed, may_exceed, shown, rising; fixed: target_m; });
 
 impl Hysteresis {
-    /// Creates the filter for a target T, m.
+    /// Creates the hysteresis filter for a target T, m.
     pub fn new(target_m: f64) -> Self {
         Self {
             target_m,
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn more_severe_reason_appears_at_once_and_less_severe_one_after_1_s() {
+    fn more_severe_limiting_factor_appears_at_once_and_less_severe_one_after_1_s() {
         let ladder = [Reason::HelixPitch, Reason::AngularStep, Reason::NoReturns, Reason::NoHeadingOrFix];
         for pair in ladder.windows(2) {
             let [lesser, graver] = [0, 1].map(|k| Advice::nothing(pair[k]));
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn intermittent_reasons_do_not_flicker() {
+    fn intermittent_limiting_factors_do_not_flicker_on_the_display() {
         let flickering =
             (0..100).map(|k| if k % 3 == 0 { Advice::nothing(Reason::AngularStep) } else { speed(0.2) });
         let shown = shown(flickering);
@@ -241,7 +241,7 @@ mod tests {
     fn exceedance_is_displayed_at_once_and_cleared_below_the_target() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
-            // The spacing T exceeds the target by less than `BEYOND`.
+            // The predicted spacing T exceeds the target by less than `BEYOND`.
             vec![at(0.502); 3],
             vec![at(0.503)],
             vec![at(0.5005); 10],

@@ -38,7 +38,7 @@ pub(super) struct Driving<'a> {
     /// hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
-    /// Speed above which no phase meets the target, m/s.
+    /// Speed above which the target is missed whatever the heads' phases, m/s.
     pub(super) bound_mps: f64,
 }
 
@@ -76,7 +76,7 @@ impl Driving<'_> {
     /// apart along the hull shift by up to a (1 / u - 1 / v) in time relative to each other. The longest gap is then
     /// at least g minus that shift, so its length is at least u g - a (1 - u / v).
     fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
-        /// Allowance for rounding.
+        /// Allowance for rounding errors of the speed.
         const A_LITTLE: f64 = 1e-9;
         let apart_m = self.apart_m;
         (most_m + apart_m) / (gap_s + apart_m / speed_mps) * (1.0 + A_LITTLE)

@@ -192,7 +192,7 @@ fn alternatives_give_speed_and_duration_and_check_the_time_left() {
     assert!((fast.v_max_mps - advice.v_max_mps).abs() < 1e-9);
     assert!((slow.v_max_mps - 1.0 / 10.818 * 0.99).abs() < 1e-3);
     assert!((advice.left.hours_at(fast.v_max_mps).unwrap() - 900.0 / fast.v_max_mps / 3600.0).abs() < 1e-12);
-    // 900 m in 3,000 s need 0.3 m/s.
+    // 900 m of tunnel in the remaining 3,000 s need 0.3 m/s.
     let suffices = |v_mps| advice.left.suffices_at(v_mps).unwrap();
     assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
 }

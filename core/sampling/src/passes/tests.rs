@@ -34,7 +34,7 @@ fn all(passes: &Passes) -> f64 {
 }
 
 #[test]
-fn evenly_phased_heads_share_the_turn() {
+fn evenly_phased_heads_pass_at_equal_intervals() {
     let passes = passes(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4]);
     assert!((all(&passes) - 2.0).abs() < 1e-9 && (passes.even_gap_s() - 2.0).abs() < 1e-12);
     let errors = passes.phase_errors_rad(4);
@@ -47,7 +47,7 @@ fn evenly_phased_heads_share_the_turn() {
 }
 
 #[test]
-fn place_hidden_from_some_heads_has_longer_gaps() {
+fn place_hidden_from_some_heads_has_longer_times_between_passes() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
@@ -173,7 +173,7 @@ fn parallax_is_larger_in_a_narrow_tunnel() {
     let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
     let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
     let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);
-    // At 6 m range, the heads are 0.3 m apart.
+    // At a range of 6 m, heads 0.3 m apart see one place at angles 0.05 rad apart.
     assert!((of(&wide, 6.0) - 0.05).abs() < 1e-3 && of(&narrow, 1.0) > 0.29);
     assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
 }
@@ -205,7 +205,7 @@ fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
             assert_eq!(heads.fits_some_speeds(), apart_m > 0.0, "{x_m:?}");
         }
     }
-    // Heads out of step have no order and thus no distance.
+    // Heads that turn in opposite senses have no order of passes and thus no such distance.
     let mut loose = situation(&[0.0, 180.0], &[0.9, -0.3]);
     loose.heads[1].as_mut().unwrap().rate_radps = -TAU / 8.0;
     let heads = Phasing::of(&loose);
@@ -216,7 +216,7 @@ fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
 
 /// Scheduled heads share the turn evenly at the planned speed, whatever their positions along the hull.
 #[test]
-fn scheduled_heads_share_the_turn_at_the_planned_speed() {
+fn scheduled_heads_pass_at_equal_intervals_at_the_planned_speed() {
     for x_m in [[0.8, 0.0, -0.5], [0.0, 1.3, 0.2]] {
         let phasing = Phasing::of(&situation(&[3.0, 200.0, 77.0], &x_m)).as_scheduled(3, 0.1);
         let gap_s = |mps: f64| all(&phasing.at(mps));

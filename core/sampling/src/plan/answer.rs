@@ -16,7 +16,7 @@ use crate::spacing::Spiral;
 pub struct Question {
     /// Target T, m.
     pub target_m: Option<f64>,
-    /// Speed, m/s.
+    /// Speed of the vehicle, m/s.
     pub speed_mps: Option<f64>,
     /// Time for the whole length of the tunnel, seconds.
     pub time_s: Option<f64>,
@@ -25,7 +25,7 @@ pub struct Question {
 /// The answer to a planning question for one mode of the heads; distances along the tunnel are at `speed_mps`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
-    /// The mode.
+    /// The mode of the heads.
     pub mode: &'static str,
     /// theta: angle between two pings, degrees.
     pub step_deg: f64,

@@ -13,9 +13,9 @@ use headrace_geometry::math::{self, TAU};
 /// The briefing of the crew for one mode of the heads at one speed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Briefing {
-    /// The mode.
+    /// The mode of the heads.
     pub mode: &'static str,
-    /// The speed of the briefing, m/s.
+    /// The vehicle's speed to which the briefing applies, m/s.
     pub speed_mps: f64,
     /// Angles hidden from each head.
     pub hidden: Vec<Hidden>,
@@ -32,7 +32,7 @@ pub struct Briefing {
 /// A range of angles that the vehicle hides from a head.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Hidden {
-    /// The head.
+    /// Number of the head from which the angles are hidden.
     pub head: usize,
     /// Middle of the hidden angle range, degrees in the sensor frame.
     pub middle_deg: f64,
@@ -62,11 +62,11 @@ pub struct ThinStrip {
 /// Start of a head's rotation program.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
-    /// The head.
+    /// Number of the head that is started.
     pub head: usize,
     /// Angle of the first ping, degrees in the sensor frame.
     pub angle_deg: f64,
-    /// Whether the angle grows after the first ping.
+    /// Whether the head's angle grows after the first ping.
     pub growing: bool,
     /// Least angle and size of the head's sector, degrees.
     pub sector_deg: Option<[f64; 2]>,
@@ -75,7 +75,7 @@ pub struct Start {
 /// The rule x = q v T / s for the distance of a head behind the foremost head.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HullAdvice {
-    /// The head.
+    /// Number of the head to which the rule applies.
     pub head: usize,
     /// Distance x of the head behind the foremost head, m.
     pub behind_m: f64,
@@ -90,7 +90,7 @@ pub struct HullAdvice {
 /// Time in which two heads can receive each other's pings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Heard {
-    /// The two heads.
+    /// Numbers of the two heads.
     pub heads: [usize; 2],
     /// Time for which each beam points at the other head, seconds per turn or sweep.
     pub facing_s: f64,

@@ -12,7 +12,7 @@ use headrace_geometry::time::DurNs;
 /// Spacing of samples at a place on the wall, with the vehicle at the nominal pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallPlace {
-    /// Arc length of the place, m.
+    /// Arc length of the place on the wall, m.
     pub arc_m: f64,
     /// Largest distance between neighbouring samples of one turn on the wall, m, over the heads that see the place.
     pub t_y_m: f64,

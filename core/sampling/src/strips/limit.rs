@@ -4,7 +4,7 @@
 use crate::spacing;
 use headrace_geometry::math;
 
-/// Vehicle motion for the prediction of spacing.
+/// Motion of the vehicle and its beams, for the prediction of sample spacing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Going {
     /// Time between two pings of a head, the longest of any head, seconds.
@@ -146,7 +146,7 @@ mod tests {
                 assert!((back_m - along_m).abs() < 1e-9, "{what}: {back_m}");
             }
         }
-        // Samples of level rows form the corners of a rectangle.
+        // If the rows are level, their samples form the corners of a rectangle.
         assert!((staggered_m(0.4, 0.3, 0.5, 0.0) - 0.5).abs() < 1e-12);
         assert!((staggered_m(0.4, 0.3, 0.3, 1.0) - 0.5).abs() < 1e-12);
     }

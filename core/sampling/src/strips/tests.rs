@@ -33,7 +33,7 @@ fn arc(from_m: f64, length_m: f64) -> Arc {
     Arc { from_m, length_m }
 }
 
-/// A step of 2.4 degrees is 0.2 m long.
+/// An angular step of 2.4 degrees is 0.2 m long on the wall.
 fn strips(views: &[View]) -> Strips {
     let ring = ring(&pipe());
     let mut strips = Strips::default();
@@ -214,7 +214,7 @@ fn long_step_in_a_sector_uses_the_pass_interval_at_that_place() {
 }
 
 #[test]
-fn steps_count_only_on_strips_that_they_touch() {
+fn sample_distances_count_only_on_strips_that_they_touch() {
     // Neighbouring samples are far apart in the corners of a rectangle, but not on a strip in the middle of the
     // floor.
     let profile = shapes::rectangle(8.0, 4.0).unwrap();

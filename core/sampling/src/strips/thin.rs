@@ -78,7 +78,7 @@ impl<'a> Thin<'a> {
         self.passes.uneven_ends()
     }
 
-    /// Whether extra passes are required for lost returns.
+    /// Whether extra passes over each place are required for lost returns.
     pub(super) fn is_lossy(&self) -> bool {
         self.passes.is_lossy()
     }

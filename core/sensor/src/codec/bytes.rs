@@ -7,7 +7,7 @@ pub struct Bytes<const N: usize> {
     len: usize,
 }
 
-/// Error: the bytes do not fit.
+/// Error: the bytes do not fit into the byte string.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("storing {len} bytes; at most {max} are allowed")]
 pub struct TooLong {
@@ -44,18 +44,18 @@ impl<const N: usize> Bytes<N> {
         Ok(())
     }
 
-    /// Removes all bytes.
+    /// Removes all bytes of the string.
     pub fn clear(&mut self) {
         self.as_mut_slice().fill(0);
         self.len = 0;
     }
 
-    /// Returns the bytes, mutably.
+    /// Returns the bytes of the string as a mutable slice.
     pub fn as_mut_slice(&mut self) -> &mut [u8] {
         self.bytes.get_mut(..self.len).unwrap_or_default()
     }
 
-    /// Returns the bytes.
+    /// Returns the bytes of the string.
     pub fn as_slice(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or_default()
     }

@@ -6,13 +6,13 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 /// Verdict on the bytes from the start of a frame candidate on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// No frame begins here.
+    /// No frame begins at this byte.
     NotAStart,
     /// A frame may begin here; a verdict needs at least this many bytes in total.
     Need(usize),
-    /// A complete frame of this many bytes.
+    /// A complete frame of this many bytes begins here.
     Frame(usize),
-    /// A start marker without a valid frame after it.
+    /// A start marker that no valid frame follows.
     Bad,
 }
 
@@ -29,10 +29,10 @@ impl Verdict {
 
 /// Frame format of one protocol; [`Framed`] turns it into a codec.
 pub trait Framing: Copy {
-    /// See [`Codec::Value`].
+    /// Value of one frame; see [`Codec::Value`].
     type Value: Clone + PartialEq + core::fmt::Debug;
 
-    /// See [`Codec::WHOLE_MESSAGES`].
+    /// Whether the transport delivers whole messages; see [`Codec::WHOLE_MESSAGES`].
     const WHOLE_MESSAGES: bool = false;
 
     /// Returns the verdict on a frame at the start of `front`, which has at least one byte; depends on `front`
@@ -75,13 +75,13 @@ impl<F, const N: usize> Framed<F, N> {
 }
 
 impl<F, const N: usize> Framed<F, N> {
-    /// Returns the frame format.
+    /// Returns the frame format of the codec.
     pub fn framing(&self) -> &F {
         &self.framing
     }
 }
 
-/// Saves the incomplete frame and the counters.
+/// Saves the codec's incomplete frame and its counters.
 impl<F, const N: usize> Stateful for Framed<F, N> {
     fn save(&self, to: &mut Saver) {
         to.value(&(self.astray, self.counts));

@@ -76,7 +76,7 @@ fn sbg(ppm: f64) -> Device {
 }
 
 #[test]
-fn drift_error_agrees_with_its_standard_deviation() {
+fn clock_drift_error_agrees_with_its_standard_deviation() {
     let mut within_two = 0;
     let mut squares = 0.0;
     let cases = 160;
@@ -103,7 +103,7 @@ fn drift_error_agrees_with_its_standard_deviation() {
 }
 
 #[test]
-fn ticks_over_10_h_are_unwrapped_exactly() {
+fn device_clock_ticks_over_10_h_are_unwrapped_exactly() {
     // The clock wraps every 71.6 minutes, so it wraps eight times in ten hours.
     let device = Device { period_ns: 1e8, ..sbg(20.0) };
     let mut clock = device.clock();
@@ -229,7 +229,7 @@ fn burst_of_stamps_at_start_counts_as_neither_restart_nor_drift() {
 }
 
 #[test]
-fn wrong_tick_length_shows_as_restarts_or_jumps() {
+fn wrong_clock_tick_length_shows_as_restarts_or_jumps() {
     // If ticks of 100 us are configured as 1 us, the clock looks slow; in the reverse case it looks fast.
     for (real, taken) in [(100_000, 1000), (1000, 100_000)] {
         let device = Device { tick: real, ..xsens(0.0) };

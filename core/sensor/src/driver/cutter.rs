@@ -26,7 +26,7 @@ pub struct Cutter<F, const N: usize> {
     parts: VecDeque<(MonoNs, usize)>,
 }
 
-/// A piece of the input: a frame, or bytes between frames.
+/// A piece of the byte stream: a frame, or bytes between frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece<'a> {
     /// Receive time of the piece's first byte.
@@ -208,7 +208,7 @@ mod tests {
         let expected: Pieces = vec![(1, vec![0xA5, 1, 9, 0x5A], true), (67, vec![0xA5, 1, 8, 0x5A], true)];
         let mut cutter = cutter();
         assert_eq!(pushed(&mut cutter, &parts), expected);
-        // A frame that has begun causes no repeated wake-ups.
+        // The start of a frame causes no repeated wake-ups of the driver.
         assert!(pushed(&mut cutter, &[(133 + 52, &[])]).is_empty());
         assert_eq!(cutter.settles(), None);
     }

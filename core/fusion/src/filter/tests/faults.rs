@@ -118,7 +118,7 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
         before = running.factors;
     }
     assert!(matches!(nav.fix(at(FAULT_S + 15.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
-    // The estimated position does not drift away during the fault.
+    // The filter's position estimate does not drift away during the fault.
     assert!((nav.running().unwrap().state.position - rig.unit(0.0)).norm() < 1.0);
 }
 

@@ -33,7 +33,7 @@ fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
 }
 
 #[test]
-fn ordinary_minute_has_consistent_innovations() {
+fn one_minute_of_ordinary_motion_has_consistent_innovations() {
     for seed in 1..5 {
         let rig = Rig::new(cruise, seed);
         let mut nav = rig.navigation();
@@ -97,7 +97,7 @@ fn covariance_stays_valid_with_noise_of_any_scale() {
 }
 
 #[test]
-fn leg_of_any_length_keeps_the_covariance_valid() {
+fn propagation_over_any_duration_keeps_the_covariance_valid() {
     let settings = Settings::default();
     let felt = InertialSample {
         rate_radps: Some(Vec3::new(0.1, 0.2, -0.1)),
@@ -437,13 +437,13 @@ fn change_over_hours(hours: u32) -> f64 {
 }
 
 #[test]
-fn sd_between_passes_does_not_grow_over_an_hour() {
+fn position_sd_between_passes_does_not_grow_over_an_hour() {
     found("filter.hour", change_over_hours(1), 0.01);
 }
 
 #[test]
 #[ignore = "takes a minute"]
-fn sd_between_passes_does_not_grow_over_10_h() {
+fn position_sd_between_passes_does_not_grow_over_10_h() {
     let change = change_over_hours(10);
     assert!(change < 0.01, "{change}");
 }

@@ -63,7 +63,7 @@ impl<const N: usize> Covariance<N> for Factors<N> {
 struct Whole<const N: usize, const JOSEPH: bool>([[f64; N]; N]);
 
 impl<const N: usize, const JOSEPH: bool> Whole<N, JOSEPH> {
-    /// Product F P F^T.
+    /// Returns the matrix product F P F^T.
     fn carried(&self, f: &[[f64; N]; N]) -> Self {
         let half: [[f64; N]; N] =
             f.map(|row| core::array::from_fn(|j| (0..N).map(|k| row[k] * self.0[k][j]).sum()));

@@ -1,4 +1,4 @@
-//! Properties of the filter's parts that hold for any input.
+//! Property tests of the filter's parts with random inputs.
 
 use proptest::prelude::*;
 
@@ -175,7 +175,7 @@ proptest! {
 }
 
 #[test]
-fn samples_in_one_burst_are_averaged() {
+fn inertial_samples_in_one_burst_are_averaged() {
     let mut window = Window::default();
     for (at_ns, x) in [(0, 1.0), (10 * MS, 2.0), (10 * MS, 40.0), (10 * MS + 1000, 3.0)] {
         assert!(window.take_force(MonoNs(at_ns), Vec3::new(x, 0.0, 0.0)));
@@ -188,7 +188,7 @@ fn samples_in_one_burst_are_averaged() {
 }
 
 #[test]
-fn full_window_rejects_readings_and_recovers() {
+fn full_reordering_window_rejects_readings_and_recovers() {
     let mut window = Window::default();
     let taken =
         (0..2000_u64).filter(|k| window.take(Waiting { at: MonoNs(*k), source: 0, reading: reading(0.0) }));

@@ -47,7 +47,7 @@ pub(super) struct Rig {
     pub(super) site: Site,
     pub(super) settings: Settings,
     pub(super) way: Way,
-    /// Factor of the sensors' noise relative to the settings.
+    /// Ratio of the sensors' noise to the noise in the settings.
     pub(super) noise: f64,
     /// Time between samples of the inertial unit, s.
     pub(super) imu_s: f64,
@@ -205,7 +205,7 @@ impl Rig {
         for (k, axis) in axes.iter().enumerate() {
             let mut h = [0.0; ERRORS];
             (h[POSITION + k], h[VELOCITY + k]) = (1.0, since_s);
-            // An attitude error moves the body's origin by axis x arm.
+            // An attitude error moves the body's origin by the cross product of rotation axis and lever arm.
             for (j, other) in axes.iter().enumerate() {
                 h[ATTITUDE + j] = other.cross(&arm).dot(axis);
             }
@@ -269,7 +269,7 @@ impl Rig {
         Reading::SpecificForce(Self::sensor(IMU).mount.rotation.inverse() * in_body + noise)
     }
 
-    /// Attitude that the unit computes.
+    /// Attitude that the inertial unit computes, with noise and without a compass deviation.
     pub(super) fn attitude(&self, t: f64) -> Reading {
         Reading::Attitude(self.level(t, 0.0))
     }

@@ -90,7 +90,7 @@ fn rays_along_walls_end_at_the_end_of_the_wall() {
         for side in [[half, 0.0, 0.0, 1.0], [0.0, half, -1.0, 0.0], [-half, 0.0, 0.0, -1.0]] {
             let [y, z, v, w] = side;
             let (origin, direction) = (turned([y, z]), [v * cos - w * sin, v * sin + w * cos]);
-            // The wall's end, where the arc starts, and the arc's centre.
+            // The end of the wall, where the arc starts, and the centre of this arc.
             let end = turned([y + inner * v, z + inner * w]);
             let centre = turned([
                 y + inner * v - radius * w.abs() * y.signum(),

@@ -40,7 +40,7 @@ fn punctual_samples_keep_their_receive_times() {
     }
 }
 
-/// Largest time error after the first 4000 samples, ns.
+/// Returns the largest time error after the first 4000 samples, ns.
 fn worst_ns(times: &[(MonoNs, MonoNs)]) -> i64 {
     times.iter().skip(4000).map(|(made, at)| at.since(*made).0.abs()).max().unwrap()
 }
