@@ -14,7 +14,7 @@ use super::plain::is_plain;
 /// Function that reads a referenced file by the name in the key, for instance a polyline profile or a DBC file.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 
-/// Maximum number of tables in an array. It is limited because each table is compared with all others.
+/// Maximum number of tables in an array. The number is limited because each table is compared with all others.
 const MOST_TABLES: usize = 2000;
 
 /// A file whose name is the value of a key.
@@ -329,7 +329,7 @@ impl<'a> Section<'a> {
         Some(self.told(self.unknown(other, &[key])))
     }
 
-    /// Reads a part of the file; `None` if the part has errors. They are noted, so that reading continues.
+    /// Reads a part of the file; `None` if the part has errors. The errors are noted, so that reading continues.
     ///
     /// Errors: the error of the part, if errors are not collected.
     pub fn part<T>(&self, read: impl FnOnce() -> Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {

@@ -125,7 +125,8 @@ impl TetherTrack {
         if self.count == 0 {
             self.restarts = restarts;
         }
-        // After a restart, the cable counter begins at zero again. This method has no means to restore the chainage.
+        // After a restart, the cable counter begins at zero again. Navigation without a filter has no means to
+        // restore the chainage.
         if restarts != self.restarts {
             return;
         }

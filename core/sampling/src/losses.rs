@@ -167,9 +167,9 @@ impl Sampled {
 
     /// Distance between passes at which the largest circle equals the target, m.
     ///
-    /// One of two neighbouring passes misses a run of pings. With half a step h and half the gap g, the circle
-    /// touches both ends of the gap and two neighbouring samples of the previous pass. Its centre is (a^2 + h^2 -
-    /// g^2) / (2 a) from the pass with the gap, where a is the distance between passes.
+    /// One of two neighbouring passes misses a run of pings. With half the distance h between samples of a turn and
+    /// half the gap g, the circle touches both ends of the gap and two neighbouring samples of the previous pass. Its
+    /// centre is (a^2 + h^2 - g^2) / (2 a) from the pass with the gap, where a is the distance between passes.
     fn along_with_run_m(&self, lost: f64) -> f64 {
         let half_m = self.t_y_m / 2.0;
         let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);

@@ -128,7 +128,7 @@ impl ExpectedErrors {
 /// A cause that lowers the speed below that of the ideal geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Margin {
-    /// No cause but the distance that the vehicle travels between two passes.
+    /// Ideal geometry: only the distance that the vehicle travels between two passes limits the speed.
     Geometry,
     /// Wall that the vehicle hides from some of its heads, or that is outside their range limits.
     Hidden,
@@ -233,7 +233,8 @@ mod tests {
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
         assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
-        // If steps nearly reach the target, three fifths of the distance between passes remain.
+        // If the distance between samples of a turn nearly reaches the target, the margin leaves three fifths of the
+        // distance between passes.
         let sure_m = 0.5 - margin_m(1.0, 0.48);
         assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);
         assert!(margin_m(0.1, 0.5).abs() <= 0.0 && margin_m(0.1, 0.6).abs() <= 0.0);

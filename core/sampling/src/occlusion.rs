@@ -297,7 +297,8 @@ mod tests {
             }
         }
         let mount = head([0.0; 3], true).mount;
-        // For a head that faces aft, a quarter turn from 10 degrees on is the quarter turn up to -10 degrees.
+        // Angles of an aft-facing head are mirrored, so its quarter turn from 10 degrees on becomes the one that ends
+        // at -10 degrees.
         let quarter = AngleRange { from_rad: 10_f64.to_radians(), size_rad: TAU / 4.0 }.across_body(&mount);
         assert!((quarter.from_rad.to_degrees() - 260.0).abs() < 1e-9, "{quarter:?}");
         assert!(quarter.has(300_f64.to_radians()) && !quarter.has(355_f64.to_radians()));
@@ -385,7 +386,7 @@ mod tests {
                 assert!(!inside(direction.scaled(enters_m - 1e-9)), "direction {direction:?}");
                 assert!(inside(direction.scaled(enters_m + 1e-9)) || !marched, "direction {direction:?}");
             }
-            // Marching in steps may miss a ray that only grazes the cylinder.
+            // The reference marches along the ray in steps, so it may miss a cylinder that the ray only grazes.
             assert!(stops || !marched, "direction {direction:?}");
             met += i32::from(stops && marched) - i32::from(stops && !marched);
         }

@@ -16,7 +16,7 @@ use sectors::{AT_ONCE, Leg};
 ///
 /// At rest, phases do not depend on the heads' offsets along the hull.
 const AT_REST_MPS: f64 = 1e-3;
-/// Relative difference of turn periods above which heads count as out of step.
+/// Relative difference of turn periods above which heads count as rotating at different rates.
 const SAME_TURN: f64 = 0.02;
 /// Limit for the cosine of the angle between a head's axis and the tunnel's axis.
 ///

@@ -147,7 +147,7 @@ impl Planner {
         &self.inspection
     }
 
-    /// Returns the modes that all heads have, in the order of the first head's.
+    /// Returns the modes that all heads have, in the order of the first head's list.
     pub fn modes(&self) -> &[PlannedMode] {
         &self.modes
     }

@@ -32,8 +32,8 @@ pub struct Strip {
     pub seen_by: HeadSet,
     /// Whether any part of the strip is hidden from a head whose beam would otherwise sweep it.
     ///
-    /// Pings then stop up to a step before the strip's edge. If the strip is merely outside a sector, pings stop at
-    /// its edge.
+    /// Pings then stop up to one angular step before the strip's edge. If the strip is merely outside a sector, pings
+    /// stop at its edge.
     pub hidden: bool,
     /// Longest time between two passes over the strip, as a share of the longest time on any strip: 0.5 to 1.
     ///
@@ -164,7 +164,8 @@ impl Strips {
     /// Measures the largest distance between samples of a turn on each strip, for each of `settings` settings of the
     /// heads.
     ///
-    /// `stride` returns the ring stride of a head's step by setting and head; `None` for an absent head.
+    /// `stride` returns the number of ring soundings in a head's step, by setting and head; `None` for an absent
+    /// head.
     ///
     /// Allocates: not if the capacity suffices for the settings.
     pub fn measure<'a>(
@@ -414,7 +415,7 @@ impl Strips {
             is_left_out &= strip.seen_by.is_empty() && !strip.hidden;
             step_m = step_m.max(self.steps_m.get(setting * count + number).map_or(0.0, |steps| steps[1]));
         }
-        // Pings end at the edge of a sector, but up to a step before the edge of a hidden arc.
+        // Pings end at the edge of a sector, but up to one angular step before the edge of a hidden arc.
         (width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }, is_left_out)
     }
 
@@ -460,11 +461,11 @@ struct Reached {
     arc_m: f64,
     strip: usize,
     forward: bool,
-    /// Whether the step certainly ends in the strip in which it begins.
+    /// Whether a head's step between two soundings certainly ends in the strip in which it begins.
     is_within: bool,
 }
 
-/// Records a step on every strip that it touches or crosses, even on the narrowest one.
+/// Records a head's step between two soundings on every strip that it touches or crosses, even the narrowest.
 fn note_step(
     strips: &[Strip],
     steps_m: &mut [[f64; 2]],

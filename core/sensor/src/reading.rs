@@ -122,7 +122,7 @@ pub struct TetherLength {
     pub length_m: f64,
     /// Quantum (resolution step) of the length, m.
     pub resolution_m: f64,
-    /// Last restart of the count from zero. `length_m` is continuous across the restart.
+    /// Last restart of the cable counter from zero. `length_m` is continuous across the restart.
     pub restart: Option<CountRestart>,
 }
 

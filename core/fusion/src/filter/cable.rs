@@ -350,8 +350,8 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // Ten equal corrections a second are summed, and the sum decays over a second. It tends to 1 / (e^0.1 - 1)
-        // corrections.
+        // Ten equal corrections a second are summed, and the sum decays over a second. The sum tends to 1 / (e^0.1 -
+        // 1) corrections.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 

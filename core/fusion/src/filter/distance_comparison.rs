@@ -1,9 +1,9 @@
 //! Comparison of distances along the tunnel by cable counter, velocity log and estimate.
 //!
-//! It detects differences that the data sheets do not explain. It uses only readings and the estimated chainage,
-//! and never the filter's covariance, gates or learnt noise. So it still works when the filter has settled on a
-//! wrong speed. The inertial unit is not compared here, because it only measures changes of speed; `slack_level.rs`
-//! compares it with the counter.
+//! The comparison detects differences between the distances that the data sheets do not explain. It uses only
+//! readings and the estimated chainage, and never the filter's covariance, gates or learnt noise. So it still works
+//! when the filter has settled on a wrong speed. The inertial unit is not compared here, because it only measures
+//! changes of speed; `slack_level.rs` compares it with the counter.
 //!
 //! Over a window W, a difference counts if it exceeds this limit, with n the variance of the counter and v the noise
 //! of the log:

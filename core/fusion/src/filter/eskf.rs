@@ -192,7 +192,7 @@ impl Eskf {
         }
     }
 
-    /// Advances to a later time, and fuses the readings in the window up to that time.
+    /// Advances the estimate to a later time, and fuses the waiting readings up to that time.
     pub fn advance(
         &mut self,
         to: MonoNs,
@@ -562,8 +562,8 @@ impl Eskf {
 
     /// Corrects by a range to the wall, with only a share of the computed correction of attitude and related errors.
     ///
-    /// The covariance is Joseph's for the smaller gain. It equals the optimal covariance plus a dyad of the omitted
-    /// gain.
+    /// The covariance is Joseph's for the smaller gain. This covariance equals the optimal covariance plus a dyad of
+    /// the omitted gain.
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {

@@ -126,9 +126,9 @@ impl TiltFit {
     /// Returns the head's tilt and its distance from zero in standard deviations, if it certainly exceeds
     /// `least_rad`.
     ///
-    /// The standard deviation comes from the scatter of blocks. It is at least that of the range noise, whose
-    /// variance is `level` times the declared one. `None` if declared noise would hide a tilt of `least_rad`, or if
-    /// the tilt is too large for the linear model.
+    /// The standard deviation comes from the scatter of blocks. It is at least the one caused by range noise, whose
+    /// variance is `level` times the declared variance. `None` if declared noise would hide a tilt of `least_rad`, or
+    /// if the tilt is too large for the linear model.
     pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
         let (tilt_rad, weight) = self.estimate()?;
         if weight * least_rad * least_rad < SHOWS * SHOWS {

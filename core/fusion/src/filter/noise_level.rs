@@ -20,8 +20,8 @@ const MOST: f64 = 9.0;
 const LEAST_OF_HEAD: f64 = 0.15;
 /// Limit at which the square of a rejected innovation is clipped, as a share of the declared variance.
 ///
-/// Rejected innovations come from rocks and stray echoes. If the wall differs from its design, there are many of
-/// them.
+/// Rejected innovations come from rocks and stray echoes. If the wall differs from its design, many innovations are
+/// rejected.
 const MOST_UNUSED: f64 = 2.0;
 /// Number of measurements in the running mean, and the minimum number before that mean is used.
 const MEMORY: u32 = 200;

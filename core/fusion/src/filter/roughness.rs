@@ -153,8 +153,8 @@ mod tests {
         }
     }
 
-    /// Nothing is learnt while the scale of ranges is unknown, from one echosounder, or from two that face the same
-    /// way.
+    /// Nothing is learnt while the scale of ranges is unknown, from one echosounder, or from two echosounders that
+    /// face the same way.
     ///
     /// The learnt roughness is at most twice the declared one.
     #[test]

@@ -1,11 +1,11 @@
 //! Size and speed of the cable's slack, measured by comparing the counter with inertial motion.
 //!
-//! The difference between counter and inertial motion contains the slack. It also contains the effect of the
-//! inertial unit's constant errors, which is a polynomial of second degree in time. So its third differences show
-//! the slack alone. At several lags, they are compared with the third differences of the slack model. If they are
-//! larger than declared, the slack is larger or faster. A single third difference far above the usual size means
-//! that the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it
-//! uses only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
+//! The difference between counter and inertial motion contains the slack. It also contains the effect of the inertial
+//! unit's constant errors, which is a polynomial of second degree in time. So its third differences show the slack
+//! alone. At several lags, these are compared with the third differences of the slack model. If the measured ones are
+//! larger, the slack is larger or faster than declared. A single third difference far above the usual size means that
+//! the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it uses
+//! only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
 //!
 //! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant
 //! T:

@@ -44,8 +44,8 @@ pub struct RestDetector {
     rested: u32,
     /// Time for which the cable has been stationary although the vehicle is not at rest, s.
     floated: u32,
-    /// Whether the vehicle floats. It was in motion for a long time while the cable was stationary, and has not been
-    /// at rest since.
+    /// Whether the vehicle floats: it moved for a long time while the cable was stationary, and has not been at rest
+    /// since.
     floats: bool,
     /// Time of the filter's first estimate, from which on the pilot is asked to keep still.
     asks_from: Option<MonoNs>,

@@ -139,7 +139,7 @@ fn wrong_velocity_log_causes_no_unreported_error() {
 
 /// If a count is stationary for minutes, the vehicle is mostly hovering.
 #[test]
-fn hovering_vehicle_keeps_a_certain_position() {
+fn hovering_vehicle_keeps_a_small_position_uncertainty() {
     let all = dives(HOVERING, Recipe::hovering);
     table(&all);
     let unsure = share(&of(&all, &|_| true), |tally| [tally.unsure, tally.epochs]);

@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn higher_speed_appears_at_once_after_a_reset() {
+    fn higher_advised_speed_is_displayed_at_once_after_a_reset() {
         let mut steady = Hysteresis::new(TARGET_M);
         let show = |steady: &mut Hysteresis, k: u64, mps: f64| {
             steady.show(MonoNs(3_000_000_000 + k * 200_000_000), speed(mps)).v_max_mps
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn lower_speed_appears_at_once_and_higher_one_after_10_s() {
+    fn lower_advised_speed_is_displayed_at_once_and_higher_one_after_10_s() {
         let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
         let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);

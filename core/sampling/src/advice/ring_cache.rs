@@ -24,7 +24,7 @@ const TURN_PER_M: f64 = 0.2;
 pub struct Looks {
     /// Number of rays in a head's ring, spread evenly over a turn; at least one.
     ///
-    /// Steps of heads are rounded up to whole multiples of the angle between rays.
+    /// Angular steps of heads are rounded up to whole multiples of the angle between rays.
     pub ring: u32,
     /// Movement across the tunnel before a ring is recast, m.
     ///
@@ -33,7 +33,7 @@ pub struct Looks {
 }
 
 impl Default for Looks {
-    /// One ray per 0.3 degrees, the finest step of the supported heads.
+    /// One ray per 0.3 degrees, which is the finest angular step of the supported heads.
     fn default() -> Self {
         Self { ring: 1200, anew_m: None }
     }
@@ -41,9 +41,9 @@ impl Default for Looks {
 
 /// Returns the movement across the tunnel before rings are recast, m.
 ///
-/// Steps of `t_y_m` on a wall `range_m` away bound the speed v for a target T. `swing_share` is w / v for a beam
-/// swing w. A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y / T_y. A step
-/// changes in proportion to its range, and by twice as much where the wall falls away.
+/// Samples of a turn that are `t_y_m` apart on a wall `range_m` away bound the speed v for a target T. `swing_share`
+/// is w / v for a beam swing w. A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y
+/// / T_y. The distance T_y changes in proportion to the range, and by twice as much where the wall falls away.
 pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64) -> f64 {
     let around2 = t_y_m * t_y_m;
     let along2 = (target_m * target_m - around2).max(0.0);

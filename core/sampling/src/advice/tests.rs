@@ -180,7 +180,7 @@ fn backward_travel_has_its_own_phases_and_remaining_length() {
 }
 
 #[test]
-fn alternatives_give_speed_and_duration_and_check_the_time_left() {
+fn alternative_modes_give_speed_and_duration_and_check_the_remaining_time() {
     let mut case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     assert_eq!(case.advice().left.suffices_at(1.0), None);
     case.left_s = Some(3000.0);

@@ -147,7 +147,7 @@ fn required_passes_grow_continuously_with_losses() {
 fn no_extra_passes_are_needed_without_losses_or_a_possible_speed() {
     assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
-    // If steps are longer than the target, no speed meets the target.
+    // If samples of a turn are farther apart than the target, no speed meets the target.
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
 }
 

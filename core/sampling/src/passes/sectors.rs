@@ -124,7 +124,8 @@ mod tests {
         for (head, ((slot, spec), program)) in legs.iter_mut().zip(specs).zip(programs).enumerate() {
             let (from_rad, size_rad) = program.sector.unwrap();
             let angle_rad = |at_s: f64| schedule.angle_rad(head, DurNs::from_secs_f64(at_s)).unwrap();
-            // A received angle is the angle at the last ping; the step is the difference from the ping before.
+            // A received angle is the angle at the last ping; the step is the difference from the previous ping's
+            // angle.
             let pings = (at_s / spec.ping_period_s).floor() * spec.ping_period_s + 1e-6;
             let step_rad = math::wrap_signed(angle_rad(pings) - angle_rad(pings - spec.ping_period_s), TAU);
             let motion = HeadMotion {

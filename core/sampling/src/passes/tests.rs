@@ -159,7 +159,7 @@ fn measured_sector_is_ignored_in_a_phase_shift_layout() {
 }
 
 #[test]
-fn remaining_heads_share_the_turn_evenly() {
+fn remaining_heads_pass_at_equal_intervals() {
     let three = Passes::evenly_phased(HeadSet::first(4).without(1), |_| 9.0).unwrap();
     assert!((all(&three) - 3.0).abs() < 1e-12);
     let none = HeadSet::default();

@@ -67,7 +67,7 @@ pub struct Answer {
     pub meets_target: Option<bool>,
     /// Whether the time in the question is enough at `v_max_mps`.
     pub suffices: Option<bool>,
-    /// Whether this mode is the best of all modes.
+    /// Whether this mode is the best answer to the question among all modes.
     pub best: bool,
 }
 

@@ -332,7 +332,7 @@ fn heads_started_for_another_speed_lower_the_largest_speed() {
 
 /// The error names the configured target, not the target minus the margin for position errors.
 #[test]
-fn error_names_the_configured_target() {
+fn plan_error_names_the_configured_target() {
     let swinging = Inspection { yaw_rate_radps: 10.0, ..vita_2(HeadLayout::PhaseShift) };
     let why = Planner::new(swinging).unwrap().v_max_mps(2, 0.6).unwrap_err();
     assert!(why.to_string().contains("a target of 0.6 m"), "{why}");

@@ -39,7 +39,7 @@ fn t_max_equals_the_reference_table() {
     for (step_deg, turn_s, expected) in modes {
         let turn = Turn::new(f64::to_radians(step_deg), turn_s).unwrap();
         for (heads, expected) in [1.0, 2.0, 4.0].into_iter().zip(expected) {
-            // A quarter turn is 37.5 steps of 2.4 degrees, so every other head's pings are half a step away from the
+            // A quarter turn is 37.5 steps of 2.4 degrees, so every second head's pings are half a step away from the
             // corner.
             let t_y = (0..4)
                 .map(|head| TAU * (f64::from(head) / heads))
@@ -93,7 +93,7 @@ fn footprint_on_a_flat_wall_equals_the_closed_form() {
 }
 
 #[test]
-fn yaw_lengthens_steps_and_beam_along_the_tunnel_is_an_error() {
+fn yaw_widens_sample_spacing_and_beam_along_the_tunnel_is_an_error() {
     let profile = shapes::ceran().unwrap();
     let turned = pose(&profile, 0.0, 0.0, f64::to_radians(15.0));
     let head = Standing::new(&profile, &turned, &mount()).unwrap();
@@ -137,7 +137,7 @@ fn step_with_few_pings_per_turn_spans_at_least_half_of_the_perimeter() {
     let ring = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let perimeter_m = profile.perimeter_m();
     assert!((ring.largest_step_m(1200) - perimeter_m).abs() < 1e-9);
-    // With two pings per turn, one of the two steps is at least half of the perimeter.
+    // With two pings per turn, one of the two distances between samples is at least half of the perimeter.
     assert!(ring.largest_step_m(600) >= perimeter_m / 2.0 - 1e-9);
     // For a head close to the left wall, a third of a turn spans more than half of the perimeter.
     let near = Standing::new(&profile, &pose(&profile, 9.9, 0.0, 0.0), &mount()).unwrap();
@@ -153,7 +153,7 @@ fn step_with_few_pings_per_turn_spans_at_least_half_of_the_perimeter() {
 proptest! {
     /// Eq. 10: for any head position and profile, the mean chord of a turn is at most perimeter / pings.
     #[test]
-    fn mean_step_is_bounded_by_the_perimeter(
+    fn mean_sample_distance_is_bounded_by_the_perimeter(
         radii in prop::collection::vec(0.5..6.0f64, 5..40),
         (along, around) in (0.0..0.95f64, 0.0..TAU),
         steps in 3_u32..800,

@@ -228,7 +228,7 @@ fn sample_distances_count_only_on_strips_that_they_touch() {
 }
 
 #[test]
-fn swing_and_shift_widen_the_distance_between_passes() {
+fn vehicle_swing_and_pass_shift_widen_the_distance_between_passes() {
     let one = strips(&[all_around(&[])]);
     let rough = Going { swing_mps: 0.01, apart_swing_mps: 0.01, shift_m: 0.05, apart_m: 0.2, ..GOING };
     let v = one.bound_for_target(0, &turning(1), 0.5, &rough).unwrap().speed_mps;

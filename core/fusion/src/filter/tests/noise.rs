@@ -30,7 +30,8 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
     assert!((is - should).abs() <= share * should.abs() + 1e-18, "{what}: {is}, not {should}");
 }
 
-/// The slack process is two lags in series, s' = -s / T + r, r' = -r / T + w. It is integrated in steps of 1e-5 T.
+/// The slack process is two lags in series, s' = -s / T + r, r' = -r / T + w. The process is integrated in steps of
+/// 1e-5 T.
 ///
 /// Euler's method has an error of the order of the step.
 #[test]

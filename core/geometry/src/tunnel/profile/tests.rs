@@ -47,10 +47,10 @@ proptest! {
 proptest! {
     /// Distances never exceed the bounds from the table of extents, and the bounds' excess is limited by geometry.
     ///
-    /// The farthest point is at most half a step away from a direction of the table. The tangents in two neighbouring
-    /// directions meet beyond the edge between their points. They meet at most half the edge's length times the
-    /// tangent of half a step away from it. The longest edge of the hull in this test is a chord that passes 1.8 m
-    /// from the centre, with its ends at 2.2 m.
+    /// The direction of the farthest point is at most half an angular step away from a direction of the table. The
+    /// tangents in two neighbouring directions meet beyond the edge between their points. The tangents meet at a
+    /// distance from the edge of at most half its length times the tangent of half a step. The longest edge of the
+    /// hull in this test is a chord that passes 1.8 m from the centre, with its ends at 2.2 m.
     #[test]
     fn precomputed_distance_bounds_exceed_the_exact_values_by_a_limited_amount(
         radii in prop::collection::vec(prop_oneof![9 => 1.8..2.2_f64, 1 => Just(1.8)], 257..600),
