@@ -227,7 +227,7 @@ impl<'a> Section<'a> {
     /// Reads a number or an array of numbers, each within `allowed`; `wanted` describes the allowed values in
     /// errors.
     ///
-    /// Errors: the value is neither, or a number is outside `allowed`.
+    /// Errors: the value is neither a number nor an array of numbers, or a number is outside `allowed`.
     pub fn number_or_numbers(
         &self,
         key: &'static str,
@@ -279,7 +279,7 @@ impl<'a> Section<'a> {
 
     /// Reads one table or an array of tables; returns no tables if the key is absent.
     ///
-    /// Errors: the value is neither, or it has too many tables.
+    /// Errors: the value is neither a table nor an array of tables, or it has too many tables.
     pub fn tables(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
         let one = self.ask(key).is_some_and(|value| matches!(value.get_ref(), DeValue::Table(_)));
         if one { Ok(self.section(key)?.into_iter().collect()) } else { self.sections(key) }

@@ -63,7 +63,7 @@ pub struct Task {
     pub layout: HeadLayout,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
-    /// Resolution and update rate of the advice's view of the wall.
+    /// Angular resolution and update rate of the rays that find the wall for the advice.
     pub looks: Looks,
 }
 

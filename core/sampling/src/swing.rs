@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn pitch_swing_counts_and_gaps_longer_than_the_history_use_its_oldest_direction() {
+    fn pitch_swing_counts_and_longer_pass_intervals_use_the_oldest_direction() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
         // The largest rotation is from the oldest stored direction to the direction farthest from it.

@@ -65,7 +65,7 @@ stateful!(Listening { state: since, before, hears_wall, attitude, force, told, h
 struct Told {
     at: MonoNs,
     chainage_m: f64,
-    /// Distance from the zero of the cable counter, m.
+    /// Length of cable since the zero of the cable counter, m.
     way_m: f64,
     sd_m: f64,
 }

@@ -337,8 +337,8 @@ mod tests {
     fn velocity_log_wrong_by_a_fifth_is_reported_with_the_difference() {
         let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
         let doubt = doubt.unwrap();
-        // The vehicle travels about 12 m in a window of a minute, and the log shows a fifth too much. The difference
-        // is smaller while the vehicle is slow.
+        // The vehicle travels about 12 m in a window of a minute, and the log shows a fifth too much. While the
+        // vehicle is slow, the difference between the distances is smaller.
         assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
         assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
     }

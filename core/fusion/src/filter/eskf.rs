@@ -175,7 +175,7 @@ impl Eskf {
         self.begun = (at, self.pose_sd().yaw_rad);
     }
 
-    /// Restarts the relation between passes whenever the standard deviation of yaw has halved.
+    /// Records that earlier samples are unrelated to later ones whenever the standard deviation of yaw has halved.
     ///
     /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
     /// about the errors between later passes.

@@ -71,7 +71,7 @@ impl Consistency {
         }
     }
 
-    /// Returns the mean NIS of the used measurements; `None` if there are none.
+    /// Returns the mean NIS (normalised innovation squared) of the used measurements; `None` if there are none.
     pub fn nis(&self) -> Option<f64> {
         (self.used > 0).then(|| self.nis_sum / self.used as f64)
     }

@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn gap_of_more_than_1_s_resets_the_hysteresis() {
+    fn advice_pause_of_more_than_1_s_resets_the_hysteresis() {
         let mut steady = Hysteresis::new(TARGET_M);
         steady.show(MonoNs(0), speed(0.1));
         assert!((steady.show(MonoNs(1_200_000_000), speed(0.2)).v_max_mps - 0.2).abs() < 1e-12);

@@ -19,7 +19,7 @@ const STILL_M: [f64; 2] = [0.004, 0.1];
 /// Tolerated rotation per metre of tolerated movement, as a quaternion component (half an angle, rad).
 const TURN_PER_M: f64 = 0.2;
 
-/// Resolution and update rate of the advice's view of the wall.
+/// Angular resolution and update rate of the rays that find the wall for the advice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
     /// Number of rays in a head's ring, spread evenly over a turn; at least one.

@@ -365,7 +365,7 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
 }
 
 #[test]
-fn swing_widens_gaps_between_heads_at_different_positions_along_the_hull() {
+fn vehicle_swing_widens_pass_distances_of_heads_apart_along_the_hull() {
     let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
     let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
@@ -612,7 +612,7 @@ fn speed_margin_is_larger_where_the_spacing_grows_faster_than_speed() {
 }
 
 #[test]
-fn mean_lost_share_is_the_mean_over_all_heads() {
+fn mean_share_of_lost_returns_is_the_mean_over_all_heads() {
     assert!((mean([0.1, 0.2, 0.6].into_iter()) - 0.3).abs() < 1e-12);
     assert!(mean(core::iter::empty()).abs() <= 0.0);
 }

@@ -82,8 +82,8 @@ fn heads_at_one_place_with_equal_angles_pass_together() {
     let together = passes(&[0.0, 0.0], &[0.0, 0.0]);
     assert!((all(&together) - 8.0).abs() < 1e-9 && (together.even_gap_s() - 4.0).abs() < 1e-12);
     assert!((together.phase_errors_rad(2)[1].unwrap().abs() - math::PI).abs() < 1e-9);
-    // Heads half a pitch apart along the hull interleave at equal angles: half a pitch is 0.8 m at 0.2 m/s and 8 s
-    // per turn.
+    // Heads at equal angles interleave if they are apart along the hull by half the advance per turn: 0.8 m at 0.2
+    // m/s and 8 s per turn.
     let apart = passes(&[0.0, 0.0], &[0.8, 0.0]);
     assert!((all(&apart) - 4.0).abs() < 1e-9);
 }
@@ -94,8 +94,7 @@ fn reversed_vehicle_reverses_the_order_of_heads() {
     let out = Phasing::of(&back).at(0.2);
     let turned = Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI);
     back.pose = Some(Pose { position: headrace_geometry::frames::Point3::zero(), attitude: turned });
-    // Travelling back with the nose ahead mirrors travelling out with the nose ahead. Travelling back with the tail
-    // ahead does not.
+    // Travelling back nose first mirrors travelling out nose first. Travelling back tail first does not.
     assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
     assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
     // If the vehicle yaws, the distance of heads along the tunnel grows. Heads whose scan planes lie along the tunnel
@@ -134,7 +133,7 @@ fn heads_must_all_rotate_in_the_same_sense_to_be_in_phase() {
 }
 
 #[test]
-fn heads_with_unequal_turn_times_have_the_gap_of_the_fastest() {
+fn heads_with_unequal_turn_periods_count_as_the_fastest_head_alone() {
     let mut mixed = situation(&[0.0, 180.0], &[0.0, 0.0]);
     if let Some(second) = mixed.heads.iter_mut().flatten().nth(1) {
         second.rate_radps = TAU / 21.6;
@@ -214,7 +213,7 @@ fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
     );
 }
 
-/// Scheduled heads share the turn evenly at the planned speed, whatever their positions along the hull.
+/// Scheduled heads pass a place at equal intervals at the planned speed, whatever their positions along the hull.
 #[test]
 fn scheduled_heads_pass_at_equal_intervals_at_the_planned_speed() {
     for x_m in [[0.8, 0.0, -0.5], [0.0, 1.3, 0.2]] {

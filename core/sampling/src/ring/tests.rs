@@ -117,7 +117,7 @@ fn yaw_widens_sample_spacing_and_beam_along_the_tunnel_is_an_error() {
 }
 
 #[test]
-fn largest_step_over_every_eighth_ray_equals_that_of_a_coarser_head() {
+fn largest_sample_distance_over_every_eighth_ray_equals_that_of_a_coarser_head() {
     let profile = shapes::ceran().unwrap();
     let fine = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let coarse = |start: u32| {
@@ -132,7 +132,7 @@ fn largest_step_over_every_eighth_ray_equals_that_of_a_coarser_head() {
 }
 
 #[test]
-fn step_with_few_pings_per_turn_spans_at_least_half_of_the_perimeter() {
+fn sample_distance_with_few_pings_per_turn_is_at_least_half_of_the_perimeter() {
     let profile = shapes::rectangle(20.0, 2.0).unwrap();
     let ring = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let perimeter_m = profile.perimeter_m();

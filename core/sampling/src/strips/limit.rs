@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn largest_gap_at_the_limit_speed_equals_the_target_with_swing_and_shift() {
+    fn largest_hole_at_the_limit_speed_equals_the_target_with_swing_and_shift() {
         let bounded = Some(0.3);
         for (swing_mps, shift_m, swing_most_m) in
             [(0.0, 0.0, None), (0.01, 0.0, None), (0.0, 0.03, None), (0.01, 0.03, bounded)]

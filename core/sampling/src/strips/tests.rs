@@ -90,7 +90,7 @@ fn fewer_passes_on_a_hidden_strip_lower_the_speed() {
 }
 
 #[test]
-fn narrow_hidden_strip_counts_like_a_long_step() {
+fn narrow_hidden_strip_counts_like_a_large_distance_between_samples() {
     let some = strips(&[all_around(&[arc(7.0, 0.1)]), all_around(&[])]);
     // The last pings on either side may be one step away from the hidden strip.
     let v = speed(&some, &turning(2), 0.8).unwrap();
@@ -161,7 +161,7 @@ fn hidden_arc_outside_a_sector_has_no_effect() {
 ///
 /// The rectangle's corners lie within the heads' sectors.
 #[test]
-fn long_step_in_a_sector_uses_the_pass_interval_at_that_place() {
+fn large_sample_distance_in_a_sector_uses_the_pass_interval_at_that_place() {
     let (target_m, sweep_s, count) = (0.5, 8.0, 75);
     let profile = shapes::rectangle(6.0, 4.0).unwrap();
     let ring = ring(&profile);
