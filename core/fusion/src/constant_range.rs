@@ -18,7 +18,7 @@ pub struct ConstantRange {
 }
 
 impl ConstantRange {
-    /// Adds a return: its range, and the excess of the range over the design range, m.
+    /// Adds a return, given by its range and by its range minus the design range, m.
     pub fn note(&mut self, range_m: f64, off_m: f64) {
         if self.returns == 0 || (range_m - self.range_m).abs() > SAME_M {
             *self = Self { returns: 1, range_m, off_m: [off_m; 2] };
@@ -36,12 +36,12 @@ impl ConstantRange {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }
 
-    /// Whether there has been any return.
+    /// Whether any return has been recorded.
     pub fn is_heard(&self) -> bool {
         self.returns > 0
     }
 
-    /// Whether the last return began a new run.
+    /// Whether the last return began a new run of equal ranges.
     pub fn is_new(&self) -> bool {
         self.returns == 1
     }

@@ -1,4 +1,4 @@
-//! Heads for the tests of this crate.
+//! Sonar heads for the tests of this crate.
 
 use super::head::{HeadBody, HeadSpec};
 use headrace_geometry::frames::{Mount, Rot, Vec3};

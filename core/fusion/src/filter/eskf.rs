@@ -1,6 +1,6 @@
 //! The error-state Kalman filter.
 //!
-//! An epoch is one leg of propagation, followed by corrections with the measurements of that time.
+//! In each epoch, inertial data first propagate the estimate; then the epoch's measurements correct it.
 
 use core::ops::Range;
 
@@ -34,43 +34,43 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// Capacity for the estimates within an epoch, one at each inertial sample.
+/// Maximum number of estimates kept within an epoch, one at each inertial sample.
 const KNOTS: usize = 256;
-/// Standard deviation of the velocity at rest, m/s, caused by motion of the sea or of the deck.
+/// Standard deviation of the velocity of a vehicle at rest, m/s, caused by motion of the sea or of the deck.
 const REST_SD_MPS: f64 = 0.02;
 /// Standard deviation of the mean turn rate over a second at rest, rad/s.
 const REST_SD_RADPS: f64 = 1e-3;
-/// Gate of the rest hypothesis. If the vehicle is at rest, the gate is exceeded once in ten thousand times.
+/// Gate for zero-velocity updates (chi-square). A vehicle at rest exceeds the gate once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// Standard deviation of the predicted range below which the wall counts as flat, m.
+/// Standard deviation of a predicted range up to which the wall counts as flat, m.
 ///
-/// If the noise of the range is smaller, it is the limit instead.
+/// If the standard deviation of the range noise is smaller, it is the limit instead.
 const NEAR_M: f64 = 0.03;
-/// Standard deviation of the speed prior, m/s.
+/// Standard deviation of the prior for the vehicle's speed, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
-/// Standard deviation added to an estimate that lies beyond the wall, m.
+/// Standard deviation by which the position uncertainty of an estimate beyond the wall is increased, m.
 const BEYOND_M: f64 = 1.5;
 
 /// Standard deviation below which the gyro bias counts as known, rad/s.
 ///
-/// A pass of 3 s is then wrong by a milliradian. A longer stop would gain little.
+/// With this bias, the attitude is wrong by a milliradian after a head pass of 3 s. A longer stop would gain little.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
 /// Maximum normalised squared innovation of a range at which the learnt smoothness of the wall applies.
 const SMOOTH: f64 = 4.0;
 /// Maximum step of a counter, as a share of its noise, at which the rounding is negligible.
 const FINE_SHARE: f64 = 0.2;
-/// Time after the start within which an estimate settles.
+/// Time after its start within which an estimate settles, as its yaw becomes certain.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Standard deviation of yaw below which the estimate counts as settled.
 ///
-/// At 6 m, soundings then move by 5 cm. Beyond that, more certainty is not worth the loss of the relation between
-/// earlier and later soundings.
+/// A yaw error of this size moves a sounding at 6 m by 5 cm. A further restart of the relation between earlier and
+/// later soundings would cost more than it gains.
 const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
-/// Maximum number of steps in an epoch: the leg, two additions to the covariance, and an end.
+/// Maximum number of recorded steps in an epoch: the propagation, two additions to the covariance, and an end.
 const STEPS: usize = 4;
 
-/// The estimate at one time, with its covariance.
+/// The filter's estimate at one time, with its covariance.
 #[derive(Debug, Clone)]
 pub struct Eskf {
     /// Time of the estimate. All earlier readings have been fused.
@@ -81,7 +81,7 @@ pub struct Eskf {
     pub factors: Factors<ERRORS>,
     /// Clones of earlier errors, for relative covariances.
     pub clones: ErrorClones,
-    /// Time of the last reacquisition of the chainage.
+    /// Time at which the filter last reacquired a lost chainage.
     pub way_sought: Option<MonoNs>,
     /// Variance of the length that the counter may have lost during motion, m^2.
     slipped_m2: f64,
@@ -91,7 +91,7 @@ pub struct Eskf {
     begun: (MonoNs, f64),
     /// Number of times that the standard deviation of yaw has halved while the estimate settled.
     pub settled: u32,
-    /// Estimates within the last epoch, before its measurements.
+    /// Estimates within the last epoch, before the epoch's measurements were fused.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
     /// Comparison of the cable counter with the estimate.
@@ -103,17 +103,17 @@ pub struct Eskf {
     seen_again: RepeatedBumps,
     /// Share of the declared variance that applies to ranges of heads until the gyro bias is known.
     ///
-    /// It is the largest such share among the heads.
+    /// The share is the largest among the heads.
     smoothness: f64,
     /// Whether the vehicle is known to be at rest. Its heads then see the same bumps in every turn.
     pub is_at_rest: bool,
     /// Whether inertial data were missing in the last epoch. The motion is then a guess, and no noise is learnt.
     is_blind: bool,
-    /// Checks of settings against the ranges.
+    /// Checks of settings by the residuals of ranges.
     pub suspicions: SettingChecks,
-    /// Variances to add at the end of the epoch, because an estimate may be wrong.
+    /// Variances to add to the errors at the end of the epoch, because the estimate may be wrong.
     doubts: Errors,
-    /// Steps of the last epoch, for smoothing; empty unless `keeps_steps`.
+    /// Filter steps of the last epoch, for smoothing; empty unless `keeps_steps`.
     pub steps: Vec<Step>,
     keeps_steps: bool,
 }
@@ -121,7 +121,7 @@ pub struct Eskf {
 stateful!(Eskf { state: at, state, factors, clones, way_sought, slipped_m2, ties, begun, settled, agreement, cable, unrest, slack_level, roughness, seen_again, smoothness, is_at_rest, is_blind, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
-    /// Allocates the buffers, without an estimate.
+    /// Creates a filter that has buffers, but no estimate yet.
     fn default() -> Self {
         Self {
             at: MonoNs(0),
@@ -161,7 +161,7 @@ impl Eskf {
         self.keeps_steps = true;
     }
 
-    /// Starts with a first estimate and its covariance.
+    /// Starts the filter with a first estimate and its covariance.
     pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
         (self.at, self.state, self.factors) = (at, state, factors);
         self.clones.clear();
@@ -175,7 +175,7 @@ impl Eskf {
         self.begun = (at, self.pose_sd().yaw_rad);
     }
 
-    /// Restarts the relation between passes whenever the standard deviation of yaw has halved.
+    /// Records that earlier samples are unrelated to later ones whenever the standard deviation of yaw has halved.
     ///
     /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
     /// about the errors between later passes.
@@ -192,7 +192,7 @@ impl Eskf {
         }
     }
 
-    /// Advances to a later time, and fuses the readings in the window up to that time.
+    /// Advances the estimate to a later time, and fuses the waiting readings up to that time.
     pub fn advance(
         &mut self,
         to: MonoNs,
@@ -273,7 +273,7 @@ impl Eskf {
         }
     }
 
-    /// Adds to the variances of the errors. The estimate itself does not change.
+    /// Adds to the variances of the estimate's errors. The estimate itself does not change.
     fn widen(&mut self, variances: &Errors) {
         self.keep(self.at, &Move::Widened(*variances), self.state);
         self.factors.widen(variances);
@@ -297,7 +297,8 @@ impl Eskf {
         self.keep(self.at, &Move::End, self.state);
     }
 
-    /// Fuses zero velocity (ZUPT) and a mean turn rate as gyro bias, unless the estimate makes rest too improbable.
+    /// Fuses zero velocity (ZUPT), and the mean turn rate as gyro bias, unless the estimated velocity contradicts
+    /// rest.
     pub fn rest(&mut self, mean_radps: Option<Vec3<Body>>) {
         let rows = measure::rest(&self.state, REST_SD_MPS);
         let unlikely = |row: &ScalarUpdate| {
@@ -353,7 +354,7 @@ impl Eskf {
         before.between(after, share)
     }
 
-    /// Fuses an update. Its residual refers to the estimate corrected by the errors in `known`.
+    /// Fuses a scalar update whose residual refers to the estimate corrected by the errors in `known`.
     fn fuse(
         &mut self,
         row: &ScalarUpdate,
@@ -367,8 +368,8 @@ impl Eskf {
         row.noise += self.left_out(row.bends);
         let (kind, declared) = (source.sensor.kind, row.noise);
         let is_head_square = kind == SensorKind::Head && row.is_square();
-        // Several readings share the rounding error of a counter. If this error matters, no noise is learnt from
-        // the innovation.
+        // Several readings of a cable counter share one rounding error. If this error matters, no noise is learnt
+        // from the innovation.
         let is_white = !matches!(&waiting.reading, Reading::TetherLength(length)
             if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m);
         if settings.learns && is_white {
@@ -378,7 +379,7 @@ impl Eskf {
         let along = self.factors.along(&row.h);
         let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
         if settings.learns && is_head_square {
-            // If the residual is too large for a smooth wall, the declared noise of a rough wall applies.
+            // If the residual of a range is too large for a smooth wall, the declared noise of a rough wall applies.
             let smooth = row.noise * self.smoothness;
             if innovation * innovation <= SMOOTH * (of_estimate + smooth) {
                 row.noise = smooth;
@@ -436,7 +437,7 @@ impl Eskf {
 
     /// Returns the variance, m^2, that bumps of the wall add to a range if many pings see the same bump.
     ///
-    /// It is 0 for other measurements.
+    /// The result is 0 for other measurements.
     fn bumps(&self, kind: SensorKind, settings: &Settings) -> f64 {
         let sees_one = settings.learns && matches!(kind, SensorKind::Echosounder { .. });
         if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
@@ -444,7 +445,7 @@ impl Eskf {
 
     /// Returns the noise to use for one of many pings that see the same bump, m^2.
     ///
-    /// It also records the ping, from which the roughness is learnt.
+    /// Also records the ping for learning the roughness of the wall.
     fn spread_over_looks(
         &mut self,
         row: &ScalarUpdate,
@@ -472,8 +473,8 @@ impl Eskf {
 
     /// Returns the variance of the second-order terms that an update neglects.
     ///
-    /// It matters only while position or attitude is very uncertain. For a normal error e, the mean square of f''
-    /// e^2 / 2 is 3/4 (f'' sd^2)^2.
+    /// The terms matter only while position or attitude is very uncertain. For a normal error e, the mean square of
+    /// f'' e^2 / 2 is 3/4 (f'' sd^2)^2.
     fn left_out(&self, [by_place, by_turn, by_both]: [f64; 3]) -> f64 {
         let sum = |axes: Range<usize>| axes.map(|i| self.factors.variance(i)).sum::<f64>();
         let (place, turn) = (sum(POSITION + 1..POSITION + 3), sum(ATTITUDE..ATTITUDE + 3));
@@ -530,7 +531,7 @@ impl Eskf {
         self.state.correct(&errors);
     }
 
-    /// Returns the standard deviations of the estimate.
+    /// Returns the standard deviations of the estimate's position and attitude.
     pub fn pose_sd(&self) -> PoseSd {
         let along_m = math::sqrt(self.along_sd_m() * self.along_sd_m() + self.slipped_m2);
         PoseSd { along_m, ..PoseSd::of(&self.factors) }
@@ -538,7 +539,7 @@ impl Eskf {
 
     /// Returns the standard deviation of the chainage error that later samples share, m.
     ///
-    /// It excludes the counter's possible permanent losses.
+    /// It excludes length that the counter may have lost permanently.
     pub fn along_sd_m(&self) -> f64 {
         math::hypot(PoseSd::of(&self.factors).along_m, self.cable.differs_m())
     }
@@ -559,11 +560,10 @@ impl Eskf {
         self.apply(row, &gain, known, errors);
     }
 
-    /// Corrects by a range to the wall, and applies only a share of the correction of the attitude and related
-    /// errors.
+    /// Corrects by a range to the wall, with only a share of the computed correction of attitude and related errors.
     ///
-    /// The covariance is Joseph's for the smaller gain. It equals the optimal covariance plus a dyad of the omitted
-    /// gain.
+    /// The covariance is Joseph's for the smaller gain. This covariance equals the optimal covariance plus a dyad of
+    /// the omitted gain.
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {
@@ -588,8 +588,7 @@ impl Eskf {
         }
     }
 
-    /// Judges a counter reading by its innovation, m, and the innovation's variance, m^2; returns whether to fuse
-    /// it.
+    /// Decides whether to fuse a cable reading, given its innovation, m, and the innovation's variance, m^2.
     ///
     /// `None` for readings of other sensors.
     fn believes_counter(
@@ -621,7 +620,7 @@ impl Eskf {
         Some(self.trusts(&CableReading { at, shown_m, off_m, sd_m, agrees, is_usual, is_lively }, errors))
     }
 
-    /// Corrects by a counter reading, and records how much the estimate changes.
+    /// Corrects the estimate by a cable reading, and records how much the estimate changes.
     fn correct_by_counter(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
         let along = |eskf: &Self, errors: &Errors| {
             [POSITION, VELOCITY].map(|i| [errors.get(i).copied().unwrap_or(0.0), eskf.factors.variance(i)])
@@ -633,8 +632,7 @@ impl Eskf {
         self.cable.corrections.note(by, [before_p[1] - after_p[1], before_v[1] - after_v[1]]);
     }
 
-    /// Judges a cable reading; returns whether to fuse it. A length that the counter has lost is added to the
-    /// creep.
+    /// Decides whether to fuse a cable reading. A length that the counter has lost is added to the creep.
     fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
         let used = self.cable.take(reading);
         self.slipped_m2 += self.cable.corrections.take_slipped_m2();
@@ -650,11 +648,12 @@ impl Eskf {
             }
             Use::Slipped(lost_m) => {
                 self.slack_level.skip();
-                // The estimated position does not change, so that later soundings fit those placed during the
-                // dispute.
+                // The estimated position does not change, so that later soundings fit those placed during the cable
+                // disagreement.
                 add_to(errors, CREEP, lost_m);
                 add_to(&mut self.doubts, CREEP, lost_m * lost_m);
-                // Either the counter has lost this length, or the estimated motion was wrong during the dispute.
+                // Either the counter has lost this length, or the estimated motion was wrong during the cable
+                // disagreement.
                 self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
                 self.ties += 1;
             }

@@ -1,4 +1,4 @@
-//! Comparison of the required passes with simulated walls: losses drawn at random, holes found by brute force.
+//! Comparison of the required number of passes with simulated walls: random losses, and holes found by brute force.
 
 use super::*;
 
@@ -13,7 +13,7 @@ fn passes(t_y_m: f64, rates: &[LossRate]) -> f64 {
     sampled(t_y_m).passes_needed(rates.iter().copied())
 }
 
-/// Random numbers from 0 to 1 (splitmix64).
+/// Generator of random numbers from 0 to 1 (splitmix64).
 struct Draw(u64);
 
 impl Draw {
@@ -26,7 +26,7 @@ impl Draw {
     }
 }
 
-/// Share of simulated stretches without an empty circle of the target's diameter.
+/// Share of simulated stretches of wall that have no empty circle of the target's diameter.
 ///
 /// Passes are `along_m` apart; each stretch is 0.25 m long.
 fn share_passed(along_m: f64, t_y_m: f64, rates: &[LossRate], seed: u64) -> f64 {
@@ -91,7 +91,7 @@ fn required_passes_leave_no_hole_in_19_of_20_stretches() {
         for (seed, rate) in (1..).zip(rates) {
             let passes = passes(t_y_m, &[rate]);
             let share = share_passed(along_m(t_y_m, passes), t_y_m, &[rate], seed);
-            // The sample has 80 stretches, and neighbouring stretches share holes.
+            // The tolerance covers a sample of 80 stretches of wall in which neighbouring stretches share holes.
             assert!(share >= 0.87, "steps of {t_y_m} m, {rate:?}: {passes:.2} passes, {share:.2} pass");
         }
     }
@@ -121,7 +121,7 @@ fn other_heads_make_up_for_the_passes_of_a_silent_head() {
     let lossy = LossRate::independent(0.1);
     let all = passes(0.1, &[deaf, lossy, lossy, lossy]);
     assert!(all > 2.05 && all > passes(0.1, &[lossy; 4]), "{all}");
-    // With equal loss rates, the number of heads has no effect.
+    // If all heads have equal loss rates, the number of heads has no effect.
     assert!((passes(0.1, &[lossy; 4]) - passes(0.1, &[lossy])).abs() < 1e-12);
 }
 
@@ -147,7 +147,7 @@ fn required_passes_grow_continuously_with_losses() {
 fn no_extra_passes_are_needed_without_losses_or_a_possible_speed() {
     assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
-    // If steps are longer than the target, no speed meets the target.
+    // If samples of a turn are farther apart than the target, no speed meets the target.
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
 }
 

@@ -60,7 +60,7 @@ impl Planner {
             lost_at_most: LossRate::default(),
         };
         let mut advisor = Advisor::new(&inspection.profile, task, &heads, &inspection.hull);
-        // Each call recasts a single outdated ring.
+        // Each call of the advisor recasts a single outdated ring of rays.
         let calls = 0..specs.len().max(1);
         let advised = calls.map(|_| advisor.advise(&situation, Swing::default(), None).v_max_mps);
         Ok(advised.last().unwrap_or(0.0))

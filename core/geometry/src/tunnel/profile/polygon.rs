@@ -1,4 +1,4 @@
-//! A profile from surveyed points.
+//! A tunnel profile made from surveyed points.
 
 use super::element::Piece;
 use super::plane::{Yz, cross, norm, sub};
@@ -25,13 +25,13 @@ impl Profile {
         }
         let (edge, start) = floor_centre(&ring).ok_or(ProfileError::BesideMiddle)?;
         let count = ring.len();
-        // The curve starts on the edge that crosses y = 0.
+        // The profile's curve starts on the edge that crosses y = 0.
         let vertex = |k: usize| ring.get((edge + k) % count);
         let pieces: Vec<Piece> = (1..=count).filter_map(vertex).map(|v| Piece::LineTo(v.point)).collect();
         Self::new(start, &pieces, reference.unwrap_or(centroid)).map_err(|error| match error {
             ProfileError::NotStarShaped { vertex: piece, reference } => {
-                // A piece begins where the previous one ends. The first piece begins within the edge that crosses y =
-                // 0.
+                // Each piece of the profile begins where the previous piece ends. The first piece begins within the
+                // edge that crosses y = 0.
                 let index = vertex(piece).map_or(0, |begin| begin.index);
                 ProfileError::NotStarShaped { vertex: index, reference }
             }
@@ -40,7 +40,7 @@ impl Profile {
     }
 }
 
-/// A point with its index in the input.
+/// A surveyed point with its index in the input.
 #[derive(Debug, Clone, Copy)]
 struct Vertex {
     index: usize,
