@@ -31,6 +31,7 @@ use headrace_monitor::run::Loop;
 use headrace_monitor::stage::Stage;
 use headrace_monitor::view::DiveView;
 use headrace_monitor::{App, SourceSpec};
+use headrace_sampling::Target;
 use headrace_sensor::codec::CodecCounts;
 use headrace_sensor::device::{Decoder, Direction};
 use headrace_sensor::reading::{Decoded, Packet};
@@ -393,7 +394,7 @@ fn store(length_m: f64, capacity: usize) -> SampleStore {
 fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
     let mut coverage = Coverage {
         store: store(length_m, samples.len()),
-        sections: Sections::new(0.25, 0.5, -1.0, length_m + 1.0),
+        sections: Sections::new(0.25, Target::new(0.5), -1.0, length_m + 1.0),
         frontier: headrace_coverage::Frontier::default(),
         soundings: Soundings::new(GridLayout {
             perimeter_m: shapes::ceran().unwrap().perimeter_m(),

@@ -76,7 +76,8 @@ impl Case {
         args: &Plan,
     ) -> Result<Self, Failure> {
         let (_, vehicle) = vehicle_file::read(path)?;
-        let question = Question { target_m: question.target_m.or(Some(vehicle.target_m)), ..question };
+        let question =
+            Question { target_m: question.target_m.or(Some(vehicle.target.max_hole_m)), ..question };
         let configs = vehicle.sensors.iter().zip(&vehicle.sensor_configs);
         let ids = configs.filter(|(sensor, _)| sensor.head().is_some()).map(|(_, config)| config.id.clone());
         let heads = ids.zip(heads_of(path, &vehicle.sensors, args.range)?).collect();

@@ -272,7 +272,7 @@ mod tests {
     use super::*;
     use crate::entities::{Head, HiddenAngles, Mounted};
     use crate::fixtures::armed;
-    use crate::resources::{Target, TunnelDesign};
+    use crate::resources::{Plan, TunnelDesign};
 
     /// Other resources and components are constant since arming, or set in each tick.
     #[test]
@@ -282,7 +282,7 @@ mod tests {
             TypeId::of::<Head>(),
             TypeId::of::<HiddenAngles>(),
             TypeId::of::<Mounted>(),
-            TypeId::of::<Target>(),
+            TypeId::of::<Plan>(),
             TypeId::of::<TunnelDesign>(),
             TypeId::of::<VehicleEntities>(),
             TypeId::of::<Commands>(),

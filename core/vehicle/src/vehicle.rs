@@ -15,12 +15,12 @@ use headrace_fusion::Navigation;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
-use headrace_sampling::SamplingError;
 use headrace_sampling::advice::Looks;
 use headrace_sampling::head::{HeadProgram, HeadSpec};
 use headrace_sampling::layout::{self, HeadLayout};
 use headrace_sampling::occlusion::Obstacle;
 use headrace_sampling::plan::Inspection;
+use headrace_sampling::{SamplingError, Target};
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::{CounterSpec, Device, DeviceKind, Sense};
 
@@ -28,8 +28,8 @@ use headrace_sensor::device::{CounterSpec, Device, DeviceKind, Sense};
 pub struct VehicleConfig {
     /// Vehicle name.
     pub name: String,
-    /// Target T: the largest hole that passes, m.
-    pub target_m: f64,
+    /// Target.
+    pub target: Target,
     /// Length of a section along the tunnel, m.
     pub section_m: f64,
     /// Water, gravity and levels.
@@ -124,7 +124,7 @@ impl VehicleConfig {
             Some(water) => root.part(|| parse_water(&water, axis_yaw_rad))?,
             None => Some((Site { axis_yaw_rad, ..Site::default() }, None)),
         };
-        let coverage =
+        let (coverage, confidence_sd) =
             CoverageConfig::of_root(root, tunnel.as_ref().map(|tunnel| &tunnel.profile), target_m)?;
         let mut hull = Vec::new();
         for section in root.sections("hull")? {
@@ -166,7 +166,7 @@ impl VehicleConfig {
         let sensors = root.required("sensors", sensors)?;
         Ok(Self {
             name,
-            target_m: target_m?,
+            target: Target { max_hole_m: target_m?, confidence_sd },
             section_m: root.required("section_m", section_m)?,
             site,
             sound_speed_from,
@@ -193,7 +193,7 @@ impl VehicleConfig {
             profile: self.tunnel.profile.clone(),
             site: self.site,
             sound_speed_from: self.sound_speed_from.clone(),
-            target_m: self.target_m,
+            target: self.target,
             section_m: self.section_m,
             length_m: self.tunnel.length_m,
             layout: self.layout,

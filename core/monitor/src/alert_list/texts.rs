@@ -21,10 +21,6 @@ pub struct TextContext<'a> {
     pub profile: &'a Profile,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Target T, m.
-    pub target_m: f64,
-    /// Confidence: number of standard deviations of the hole by which a verdict must clear the target.
-    pub confidence_sd: f64,
     /// Sections, for the place to go back to.
     pub sections: &'a Sections,
     /// Names and other settings of the heads.
@@ -39,19 +35,11 @@ impl<'a> TextContext<'a> {
         sections: &'a Sections,
         heads: &'a HeadDescriptions,
     ) -> Self {
-        Self {
-            sources,
-            profile,
-            section_m: sections.section_m(),
-            target_m: sections.target_m(),
-            confidence_sd: sections.confidence_sd(),
-            sections,
-            heads,
-        }
+        Self { sources, profile, section_m: sections.section_m(), sections, heads }
     }
 
     fn unsure(&self, stretch: &Stretch) -> UnsureStretch {
-        UnsureStretch::from_sections(stretch, self.section_m, self.confidence_sd)
+        UnsureStretch::of(stretch, self.sections)
     }
 
     fn name(&self, source: usize) -> String {

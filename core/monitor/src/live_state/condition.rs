@@ -140,7 +140,7 @@ impl LiveState {
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
             // The forecast is latched for a second. The present turn may already be better.
-            _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => {
+            _ if advice.will_exceed && self.turn_exceeds(self.target.max_hole_m) && share <= OVER => {
                 Condition::TurnFails
             }
             PositionState::Doubtful(doubt) => Condition::CannotSay(doubt),

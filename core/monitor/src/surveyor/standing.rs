@@ -91,7 +91,7 @@ fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) 
     let reaches = heads.iter().map(|(.., frontier)| frontier.0.map(|reach| reach.latest()));
     let all = reaches.reduce(|all, reach| Some(all?.with(reach?))).flatten();
     let Some(all) = all.filter(|_| situation.pose.is_some()) else { return false };
-    let (ahead_m, around_m) = (SOON_S * situation.speed_mps, sections.target_m() / 2.0);
+    let (ahead_m, around_m) = (SOON_S * situation.speed_mps, sections.target().max_hole_m / 2.0);
     let from_m = all.from_m.min(all.from_m + ahead_m) - around_m;
     let to_m = all.to_m.max(all.to_m + ahead_m) + around_m;
     let mut indices = sections.index_of(from_m)..=sections.index_of(to_m);
