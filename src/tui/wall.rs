@@ -2,7 +2,7 @@
 
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
-use headrace_geometry::tunnel::Profile;
+use headrace_geometry::tunnel::{Profile, WallPoint};
 use headrace_monitor::run::Loop;
 
 /// Number of parts into which the perimeter is divided for clock positions.
@@ -82,7 +82,7 @@ impl Cell {
             let (from_m, to_m) = sections.bounds_m(index);
             let half_m = sections.target().max_hole_m / 2.0;
             let (from_m, to_m) = (from_m - half_m, to_m + half_m);
-            coverage.store.each_between(from_m, to_m, |x_m, arc_m, _| {
+            coverage.store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {
                 if (from_m..to_m).contains(&x_m) {
                     seen |= clock.bit(arc_m);
                 }

@@ -8,6 +8,7 @@ use crate::missing_samples::MissingSample;
 use crate::passage::Drive;
 use crate::store::SampleStore;
 use headrace_geometry::math;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
 /// Share of the target that the hole may use if the speed is corrected, because a plan keeps a margin.
@@ -193,7 +194,7 @@ impl<'a> Trial<'a> {
             // The range includes samples that are mirrored later.
             .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
             .filter(|lack| lack.why.is_within(removed))
-            .map(|lack| [lack.x_m, lack.arc_m]);
+            .map(|lack| WallPoint { x_m: lack.x_m, arc_m: lack.arc_m });
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
     }
 

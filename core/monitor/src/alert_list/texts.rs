@@ -1,7 +1,7 @@
 //! Texts of alerts, from the same table as the pilot's other lines. Allocates: outlets only, never within a
 //! tick.
 
-use super::{AlertState, Figures, ListKind, ListedAlert, Occurrences};
+use super::{AlertState, Figures, ListKind, ListedAlert, Occurrence, Occurrences};
 use crate::head_descriptions::HeadDescriptions;
 use crate::pilot_text::{
     actions_text, advice_text, cause_text, clock_text, no_position_text, observation_text, setting_text,
@@ -85,7 +85,10 @@ impl ListedAlert {
             (_, Figures::MissingRequirement(lacking)) => no_position_text(*lacking),
             (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
             (kind, Figures::Deviation(Occurrences { first_m, worst_m, .. })) => match kind.observed() {
-                Some(kind) => place_first(&observation_text(kind, &name, *first_m, *worst_m), *first_m),
+                Some(kind) => {
+                    let worst = Occurrence { x_m: *first_m, off_m: *worst_m };
+                    place_first(&observation_text(kind, &name, worst), *first_m)
+                }
                 None => String::new(),
             },
             (_, Figures::Setting(doubt, Occurrences { first_m, .. })) => {

@@ -7,13 +7,14 @@ use super::decode::Events;
 use super::navigate::{Positioned, PositionedList};
 use crate::entities::{Head, HiddenAngles, LossCount, MeasuredMotion, Mounted};
 use crate::head_health::Heard;
-use crate::messages::{Aim, Event, Hidden, Outcome, PlacedItem, PlacedPing, Placement, Update};
+use crate::messages::{Event, Hidden, Outcome, PlacedItem, PlacedPing, Placement, Update};
 use crate::resources::{Plan, TunnelDesign};
 use headrace_coverage::deviation::off_m;
 use headrace_coverage::{Loss, PassError};
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Mount, head_direction};
 use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS, SILENT_AFTER};
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
@@ -152,7 +153,7 @@ fn outcome(
         return sample(range_m);
     }
     let wall = tunnel.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
-    let aim = wall.map(|wall| Aim { x_m: origin.x() + wall.range_m * beam.x(), arc_m: wall.arc_m });
+    let aim = wall.map(|wall| WallPoint { x_m: origin.x() + wall.range_m * beam.x(), arc_m: wall.arc_m });
     let wall_m = wall.map(|wall| wall.range_m);
     if let Some(range_m) = range_m.filter(|range_m| wall_m.is_none_or(|wall| *range_m > VEHICLE_SHARE * wall))
     {

@@ -112,6 +112,7 @@ fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::fixtures::{coverage, mount, pipe, situation};
+    use crate::observations::Occurrence;
     use bevy_ecs::system::SystemState;
     use bevy_ecs::world::World;
     use headrace_coverage::{HeadReach, HoleFinder, Judging, MissingSamples, Reach, Request};
@@ -201,7 +202,7 @@ mod tests {
         let kinds = [ObservedKind::HeadScattered, ObservedKind::HeadConstant, ObservedKind::HeadOutvoted];
         let (mut observations, at) = (Observations::default(), MonoNs(5));
         for (source, kind) in (0..3).flat_map(|source| kinds.map(|kind| (SourceId(source), kind))) {
-            observations.note_of(Some(source), kind, at, 1.0, 0.5);
+            observations.note_of(Some(source), kind, at, Occurrence { x_m: 1.0, off_m: 0.5 });
         }
         let doubts = Doubts { cable: None, setting: None, stand_s: 0, hung: 0 };
         for (head, kind) in (0..3).zip(kinds) {
