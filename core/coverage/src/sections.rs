@@ -233,8 +233,6 @@ impl Sections {
     ///
     /// Allocates: never.
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
-        let (from_m, to_m) = self.bounds_m(request.section);
-        let target = self.target;
         let section = self.get(request.section)?;
         if section.verdict == Verdict::Pass && section.visits.are_several() && section.doubt().is_none() {
             // A later visit does not revoke the pass of an earlier visit.
@@ -245,14 +243,39 @@ impl Sections {
         if request.only_fails && !fails {
             return None;
         }
-        let Measured { hole, sd_m, by_newest } = self.measure(request.section, judging)?;
+        let measured = self.measure(request.section, judging)?;
+        let section = self.get(request.section)?;
+        let before = Self::counted(section);
+        let is_like = section.hole.is_some_and(|before| before.is_like(&measured.hole));
+        let is_same = is_like && section.evidence.is_some() && !section.explained_in_part;
+        self.decide(request, &measured, fails, judging)?;
+        // The evidence of an unchanged hole is kept, because its missing samples may no longer be stored.
+        if self.get(request.section)?.verdict == Verdict::Fail && !is_same {
+            let evidence = self.explain(&measured.hole, request, judging);
+            let evidence = self.as_beside(request.section, evidence);
+            let section = self.get_mut(request.section)?;
+            (section.evidence, section.explained_in_part) = (Some(evidence), request.only_fails);
+        }
+        let section = self.get_mut(request.section)?;
+        let (judgement, now) = (section.flag(request.at), Self::counted(section));
+        self.count(before, now);
+        self.tell_runs(request, judging);
+        Some(judgement)
+    }
+
+    /// Updates a section's hole and verdict. `fails` says whether the section fails whatever its largest hole.
+    fn decide(
+        &mut self,
+        request: &Request,
+        &Measured { hole, sd_m, by_newest }: &Measured,
+        fails: bool,
+        judging: &mut Judging<'_>,
+    ) -> Option<()> {
+        let (target, (from_m, to_m)) = (self.target, self.bounds_m(request.section));
         let clear_m = clear_of(request.to_come, hole.x_m);
         let passed_m = clear_of(request.not_passed, hole.x_m);
         let section = self.get_mut(request.section)?;
-        let before = Self::counted(section);
         let had_a_flag = section.is_flagged();
-        let is_like = section.hole.is_some_and(|before| before.is_like(&hole));
-        let is_same = is_like && section.evidence.is_some() && !section.explained_in_part;
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
         section.verdict = match verdict(&hole, sd_m, target, clear_m.min(passed_m)) {
@@ -287,18 +310,7 @@ impl Sections {
             // The section was missed, and the dive ended on the way back over it.
             (section.verdict, section.not_inspected) = (Verdict::Fail, false);
         }
-        // The evidence of an unchanged hole is kept, because its missing samples may no longer be stored.
-        if section.verdict == Verdict::Fail && !is_same {
-            let evidence = self.explain(&hole, request, judging);
-            let evidence = self.as_beside(request.section, evidence);
-            let section = self.get_mut(request.section)?;
-            (section.evidence, section.explained_in_part) = (Some(evidence), request.only_fails);
-        }
-        let section = self.get_mut(request.section)?;
-        let (judgement, now) = (section.flag(request.at), Self::counted(section));
-        self.count(before, now);
-        self.tell_runs(request, judging);
-        Some(judgement)
+        Some(())
     }
 
     /// Returns the evidence of a section.
