@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use headrace_coverage::hole::FARTHEST_M;
 use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
 use headrace_geometry::math;
-use headrace_geometry::tunnel::shapes;
+use headrace_geometry::tunnel::{WallPoint, shapes};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
@@ -88,7 +88,8 @@ fn store(length_m: f64, capacity: u32) -> SampleStore {
 fn covered(samples: &[WallSample]) -> SampleStore {
     let mut store = store(LENGTH_M, u32::try_from(samples.len()).unwrap());
     for sample in samples {
-        black_box(store.nearest_pass_m(sample.x_m, sample.arc_m, FARTHEST_M));
+        let at = WallPoint { x_m: sample.x_m, arc_m: sample.arc_m };
+        black_box(store.nearest_pass_m(at, FARTHEST_M));
         store.insert(*sample).unwrap();
     }
     store

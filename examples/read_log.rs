@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // could change them.
     dive.finish(&mut |_, _| ());
 
-    println!("{}, target {} m", vehicle.name, vehicle.target_m);
+    println!("{}, target {} m", vehicle.name, vehicle.target.max_hole_m);
     println!("{:>10}  {:>8}  {:>6}  verdict", "from", "hole m", "sd m");
     let sections = &dive.view().coverage().sections;
     let first = sections.index_of(0.0);

@@ -62,7 +62,10 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let shown = followers.show(Show::Lines);
     let mut watch = Watch::new(shown);
     if watch.shows_lines() {
-        say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
+        say(&format!(
+            "{}, target {} m: a simulated dive",
+            scene.vehicle.name, scene.vehicle.target.max_hole_m
+        ));
     }
     let served = is_served.then(|| demo_page(args, &scene, &log, &dive, watch.shows_lines())).flatten();
     if let Some(served) = &served {
@@ -281,7 +284,7 @@ fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(),
 /// Overrides the vehicle's settings by the options. The first of several targets or section lengths is the
 /// dive's own.
 fn set(args: &Replay, vehicle: &mut VehicleConfig) {
-    vehicle.target_m = args.target.first().copied().unwrap_or(vehicle.target_m);
+    vehicle.target.max_hole_m = args.target.first().copied().unwrap_or(vehicle.target.max_hole_m);
     vehicle.section_m = args.section.first().copied().unwrap_or(vehicle.section_m);
     vehicle.site.sound_speed_mps = args.sound_speed.unwrap_or(vehicle.site.sound_speed_mps);
 }

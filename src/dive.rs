@@ -201,15 +201,15 @@ pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
     let specified = vehicle.sensors.iter().filter_map(|sensor| {
         let (device, spec) = (sensor.as_ref(), sensor.head()?);
         let head = HeadSpecification::of(device, spec, &mission);
-        Some(head.settings(&sensor.specification().sensor.id, &mission.profile, mission.target_m))
+        Some(head.settings(&sensor.specification().sensor.id, &mission.profile, mission.target.max_hole_m))
     });
     let head_descriptions = HeadDescriptions::of(specified);
     let reaches = heads.clone().map(|(_, sensor)| sensor.specification().sensor.mount.position.x().abs());
     Site {
         profile: vehicle.tunnel.profile.clone(),
-        target_m: vehicle.target_m,
+        target_m: vehicle.target.max_hole_m,
         section_m: vehicle.section_m,
-        run_up_m: reaches.fold(0.0, f64::max) + vehicle.target_m,
+        run_up_m: reaches.fold(0.0, f64::max) + vehicle.target.max_hole_m,
         length_m: vehicle.tunnel.length_m,
         head_descriptions,
         heads: heads.map(|(source, _)| source).collect(),

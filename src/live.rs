@@ -142,7 +142,7 @@ fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
         (false, None) => format!("recorded to {firsts}"),
         (false, Some(_)) => format!("recorded in parts, starting with {firsts}"),
     };
-    format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m)
+    format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target.max_hole_m)
 }
 
 /// Checks that a dive can be recorded to these files.

@@ -29,7 +29,7 @@ pub(crate) fn reports(
 ) -> Result<Vec<OtherTargetReport>, Failure> {
     let own = |asked: &[f64], own: f64| if asked.is_empty() { vec![own] } else { asked.to_vec() };
     let (targets_m, sections_m) =
-        (own(&args.target, vehicle.target_m), own(&args.section, vehicle.section_m));
+        (own(&args.target, vehicle.target.max_hole_m), own(&args.section, vehicle.section_m));
     let mut all = Vec::new();
     if !is_asked(args) {
         return Ok(all);
@@ -37,7 +37,7 @@ pub(crate) fn reports(
     let _phase = Phase::start("other targets and sections");
     for section_m in sections_m {
         for target_m in &targets_m {
-            (vehicle.target_m, vehicle.section_m) = (*target_m, section_m);
+            (vehicle.target.max_hole_m, vehicle.section_m) = (*target_m, section_m);
             let is_played = target_m.to_bits() == played.target_m.to_bits()
                 && section_m.to_bits() == played.section_m.to_bits();
             all.push(if is_played {

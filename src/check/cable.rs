@@ -36,8 +36,8 @@ impl Cable {
         let planned_mps = Some(vehicle.planned_speed_mps).filter(|planned| *planned > 0.0);
         let at_speed = errors.zip(planned_mps.or(v_max_mps)).map(|(errors, speed_mps)| {
             // Time between the passes on either side of a hole of the target's size.
-            let sd_m = errors.pass_error_m(vehicle.target_m / speed_mps);
-            [speed_mps, sd_m, (vehicle.target_m - errors.confidence_sd * sd_m).max(0.0)]
+            let sd_m = errors.pass_error_m(vehicle.target.max_hole_m / speed_mps);
+            [speed_mps, sd_m, (vehicle.target.max_hole_m - vehicle.target.error_m(sd_m)).max(0.0)]
         });
         let slack = [settings.slack.reach, settings.slack.time_s];
         Some(Self { step_m, slack, at_speed, missing: missing(vehicle, text) })

@@ -155,7 +155,7 @@ impl Readable {
         lines.extend(self.scene.as_ref().map(|(name, duration_s)| format!("{name}: {duration_s:.0} s")));
         lines.push(format!(
             "{}: target {} m, sections of {} m",
-            vehicle.name, vehicle.target_m, vehicle.section_m
+            vehicle.name, vehicle.target.max_hole_m, vehicle.section_m
         ));
         lines.push(format!(
             "tunnel {}: perimeter {:.2} m, length {} m",
@@ -208,7 +208,7 @@ fn json(readable: Option<&Readable>, found: &[Found]) -> Value {
             |s: &headrace_sensor::SensorConfig| json!({"id": s.id, "plugin": s.plugin, "connect": s.connect});
         let entries = [
             ("vehicle", json!(vehicle.name)),
-            ("target_m", json!(vehicle.target_m)),
+            ("target_m", json!(vehicle.target.max_hole_m)),
             ("section_m", json!(vehicle.section_m)),
             ("tunnel", json!(vehicle.tunnel.name)),
             ("perimeter_m", json!(vehicle.tunnel.profile.perimeter_m())),

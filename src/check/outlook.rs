@@ -68,14 +68,14 @@ impl Outlook {
             sound_speed_mps: vehicle.site.sound_speed_mps,
         })?
         .with_errors(errors);
-        let question = Question { target_m: Some(vehicle.target_m), speed_mps: None, time_s: None };
+        let question = Question { target_m: Some(vehicle.target.max_hole_m), speed_mps: None, time_s: None };
         let answers = planner.answers(&question, None)?;
         let mode = planner.modes().iter().position(|planned| Some(planned.mode.name) == own);
         let briefing = planner.briefing(mode.unwrap_or(0), ANY_SPEED_MPS)?;
         let planned_mps = vehicle.planned_speed_mps;
         let as_started_mps = mode
             .filter(|_| planned_mps > 0.0)
-            .and_then(|mode| planner.as_started_mps(mode, vehicle.target_m, planned_mps).ok());
+            .and_then(|mode| planner.as_started_mps(mode, vehicle.target.max_hole_m, planned_mps).ok());
         let best = answers.iter().find(|answer| answer.best && answer.v_max_mps.is_some()).cloned();
         Ok(Some(Self {
             own: answers.into_iter().find(|answer| Some(answer.mode) == own),

@@ -10,7 +10,6 @@ use headrace_geometry::time::DurNs;
 use headrace_sampling::head::{HeadMode, HeadSpec};
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::margin::ExpectedErrors;
-use headrace_sampling::occlusion::Obstacle;
 use headrace_sampling::plan::{Answer, Briefing, InLine, Inspection, Planner, Question};
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::Device;
@@ -45,70 +44,35 @@ type Head = (HeadSpec, Vec<HeadMode>);
 impl Case {
     /// Creates the case from the options, which override the vehicle file.
     pub(super) fn of(args: &Plan) -> Result<Self, Failure> {
-        let question = Question {
-            target_m: args.target,
-            speed_mps: args.speed,
-            time_s: args.hours.map(|hours| hours * 3600.0),
-        };
         let tunnel = args.tunnel.as_deref().map(tunnel).transpose()?;
         match (&args.vehicle, tunnel) {
-            (Some(path), tunnel) => Self::of_vehicle(path, tunnel, question, args),
-            (None, Some(tunnel)) => {
-                let layout = args.layout.unwrap_or(HeadLayout::PhaseShift);
-                Ok(Self::new(
-                    tunnel,
-                    ideal_heads(args)?,
-                    Vec::new(),
-                    layout,
-                    Site::default().sound_speed_mps,
-                    question,
-                    args,
-                ))
-            }
+            (Some(path), tunnel) => Self::of_vehicle(path, tunnel, args),
+            (None, Some(tunnel)) => Ok(Self::new(tunnel, ideal_heads(args)?, args)),
             (None, None) => Err(Failure::Usage("plan: needs --tunnel or --vehicle".to_owned())),
         }
     }
 
-    fn of_vehicle(
-        path: &Path,
-        tunnel: Option<TunnelConfig>,
-        question: Question,
-        args: &Plan,
-    ) -> Result<Self, Failure> {
+    fn of_vehicle(path: &Path, tunnel: Option<TunnelConfig>, args: &Plan) -> Result<Self, Failure> {
         let (_, vehicle) = vehicle_file::read(path)?;
-        let question = Question { target_m: question.target_m.or(Some(vehicle.target_m)), ..question };
         let configs = vehicle.sensors.iter().zip(&vehicle.sensor_configs);
         let ids = configs.filter(|(sensor, _)| sensor.head().is_some()).map(|(_, config)| config.id.clone());
         let heads = ids.zip(heads_of(path, &vehicle.sensors, args.range)?).collect();
-        let layout = args.layout.unwrap_or(vehicle.layout);
-        let sound_speed_mps = vehicle.site.sound_speed_mps;
         let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
         let errors =
             position_error_model::expected_errors(&vehicle, &name, &KINDS, &files::bytes_beside(path));
         let errors = errors.map_err(|why| Failure::Usage(format!("plan: {why}")))?;
         let mut inputs = vehicle_file::files(path, &vehicle);
-        let case = Self::new(
-            tunnel.unwrap_or(vehicle.tunnel),
-            heads,
-            vehicle.hull,
-            layout,
-            sound_speed_mps,
-            question,
-            args,
-        );
+        let mut case = Self::new(tunnel.unwrap_or(vehicle.tunnel), heads, args);
+        case.question.target_m = case.question.target_m.or(Some(vehicle.target.max_hole_m));
+        case.inspection.hull = vehicle.hull;
+        case.inspection.layout = args.layout.unwrap_or(vehicle.layout);
+        case.inspection.sound_speed_mps = vehicle.site.sound_speed_mps;
         inputs.extend_from_slice(&case.inputs);
         Ok(Self { errors, inputs, ..case })
     }
 
-    fn new(
-        tunnel: TunnelConfig,
-        heads: Vec<(String, Head)>,
-        hull: Vec<Obstacle>,
-        layout: HeadLayout,
-        sound_speed_mps: f64,
-        question: Question,
-        args: &Plan,
-    ) -> Self {
+    /// Creates the case of heads without a hull, in water of the default site.
+    fn new(tunnel: TunnelConfig, heads: Vec<(String, Head)>, args: &Plan) -> Self {
         let (ids, heads): (Vec<String>, Vec<Head>) = heads.into_iter().unzip();
         let range_m = heads.iter().map(|(spec, _)| spec.range_m[1]).fold(0.0, f64::max);
         let inspection = Inspection {
@@ -116,12 +80,17 @@ impl Case {
             place: args.at.unwrap_or(tunnel.profile.reference()),
             profile: tunnel.profile,
             heads,
-            hull,
-            layout,
+            hull: Vec::new(),
+            layout: args.layout.unwrap_or(HeadLayout::PhaseShift),
             drift_m: args.drift,
             yaw_rad: args.yaw.to_radians(),
             yaw_rate_radps: args.yaw_rate.to_radians(),
-            sound_speed_mps,
+            sound_speed_mps: Site::default().sound_speed_mps,
+        };
+        let question = Question {
+            target_m: args.target,
+            speed_mps: args.speed,
+            time_s: args.hours.map(|hours| hours * 3600.0),
         };
         Self {
             inspection,

@@ -248,7 +248,7 @@ inner."name" = "name 6"
             };
             let (before, after) = (read(&text), read(&clean));
             let told = |vehicle: &VehicleConfig| format!("{:?} {:?}", vehicle.tunnel, vehicle.site);
-            assert_eq!((told(&after), after.target_m), (told(&before), before.target_m));
+            assert_eq!((told(&after), after.target), (told(&before), before.target));
             let sensors = |vehicle: &VehicleConfig| {
                 let sensors = vehicle.sensor_configs.iter();
                 sensors.map(|s| format!("{} {} {:?}", s.id, s.plugin, s.mount)).collect::<Vec<_>>()

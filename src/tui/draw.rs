@@ -151,7 +151,7 @@ impl Page {
         let width = usize::from(rows.width());
         let (vehicle, target) = match &self.shot {
             Some(shot) => {
-                (one_line(&shot.vehicle).into_owned(), format!(", target {} m", shot.state.target_m))
+                (one_line(&shot.vehicle).into_owned(), format!(", target {} m", shot.state.target.max_hole_m))
             }
             None => (String::new(), String::new()),
         };

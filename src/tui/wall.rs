@@ -2,7 +2,7 @@
 
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
-use headrace_geometry::tunnel::Profile;
+use headrace_geometry::tunnel::{Profile, WallPoint};
 use headrace_monitor::run::Loop;
 
 /// Number of parts into which the perimeter is divided for clock positions.
@@ -80,8 +80,9 @@ impl Cell {
             // A passing hole is at most as wide as the target, so wall within half the target of a sample
             // counts as covered.
             let (from_m, to_m) = sections.bounds_m(index);
-            let (from_m, to_m) = (from_m - sections.target_m() / 2.0, to_m + sections.target_m() / 2.0);
-            coverage.store.each_between(from_m, to_m, |x_m, arc_m, _| {
+            let half_m = sections.target().max_hole_m / 2.0;
+            let (from_m, to_m) = (from_m - half_m, to_m + half_m);
+            coverage.store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {
                 if (from_m..to_m).contains(&x_m) {
                     seen |= clock.bit(arc_m);
                 }
@@ -91,7 +92,7 @@ impl Cell {
         if let Some(hole) = section.hole.filter(|_| matches!(known, Known::Missed | Known::CannotSay)) {
             seen &= !clock.bit(hole.arc_m);
         }
-        let share = section.hole.map(|hole| hole.diameter_m / sections.target_m());
+        let share = section.hole.map(|hole| hole.diameter_m / sections.target().max_hole_m);
         Some(Self { known, share: share.filter(|_| section.verdict != Verdict::Open), seen })
     }
 

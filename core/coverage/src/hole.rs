@@ -20,6 +20,7 @@ use self::window::{Nearest, Window};
 use super::store::SampleStore;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
+use headrace_geometry::tunnel::WallPoint;
 
 mod certain;
 mod division;
@@ -101,18 +102,14 @@ struct Tile {
 #[derive(Debug, Clone, Copy)]
 struct Best {
     distance_m: f64,
-    x_m: f64,
-    arc_m: f64,
+    at: WallPoint,
     /// Largest upper bound among the dropped tiles, m.
     dropped_m: f64,
 }
 
 /// A point without a sample within the search radius.
 #[derive(Debug, Clone, Copy)]
-struct Beyond {
-    x_m: f64,
-    arc_m: f64,
-}
+struct Beyond(WallPoint);
 
 /// Result of searching for a sample near the centre of a tile.
 enum Near {
@@ -136,6 +133,11 @@ impl Near {
 }
 
 impl Tile {
+    /// Centre of the tile, with the chainage from the start of the section.
+    fn centre(&self) -> WallPoint {
+        WallPoint { x_m: self.x_m, arc_m: self.arc_m }
+    }
+
     /// Half diagonal of the tile, m.
     fn half_m(&self) -> f64 {
         math::sqrt(self.half_x_m * self.half_x_m + self.half_arc_m * self.half_arc_m)
@@ -167,7 +169,7 @@ impl Tile {
             return Near::Settled;
         }
         let within_m = within_m.min(owner_m + ROUNDING_M);
-        window.near_enough(self.x_m, self.arc_m, within_m, enough_m).map_or(Near::Nothing, Near::Sample)
+        window.near_enough(self.centre(), within_m, enough_m).map_or(Near::Nothing, Near::Sample)
     }
 
     /// Returns the halves of a tile. Their `owner` becomes the nearest sample, if one is within reach.
@@ -271,7 +273,7 @@ impl HoleFinder {
     ///
     /// Errors: a point has no sample within `reach_m`.
     fn search(&mut self, length_m: f64, reach_m: f64) -> Result<Best, Beyond> {
-        let mut best = Best { distance_m: 0.0, x_m: 0.0, arc_m: 0.0, dropped_m: 0.0 };
+        let mut best = Best { distance_m: 0.0, at: WallPoint::default(), dropped_m: 0.0 };
         self.tiles.clear();
         // A good first guess at the hole saves most of the work. All tiles' centres are evaluated before any
         // tile is divided, and the tile with the largest bound is divided first.
@@ -313,16 +315,17 @@ impl HoleFinder {
             }
             let x_m = tile.x_m + (worst.owner.0 + worst.farthest.0);
             let arc_m = tile.arc_m + (worst.owner.1 + worst.farthest.1);
-            let Some(found) = self.window.nearest(x_m, arc_m, bound_m.min(reach_m)) else {
+            let corner = WallPoint { x_m, arc_m };
+            let Some(found) = self.window.nearest(corner, bound_m.min(reach_m)) else {
                 if bound_m > reach_m {
-                    return Err(Beyond { x_m, arc_m });
+                    return Err(Beyond(corner));
                 }
                 // The owner of the share is the nearest sample to the farthest corner, except for rounding.
-                best.take(bound_m, x_m, arc_m);
+                best.take(bound_m, corner);
                 return Ok(true);
             };
             let distance_m = math::sqrt(found.distance2);
-            best.take(distance_m, x_m, arc_m);
+            best.take(distance_m, corner);
             if distance_m >= bound_m - PROVEN_M {
                 best.dropped_m = best.dropped_m.max(bound_m);
                 return Ok(true);
@@ -345,8 +348,8 @@ impl HoleFinder {
             diameter_m,
             least_m: if self.window.overfull { 0.0 } else { least_m.max(0.0) },
             most_m: 2.0 * (radius_m + fidelity.moved_m),
-            x_m: self.window.chainage_m(best.x_m),
-            arc_m: math::wrap(best.arc_m, self.window.perimeter_m()),
+            x_m: self.window.chainage_m(best.at.x_m),
+            arc_m: math::wrap(best.at.arc_m, self.window.perimeter_m()),
             bounded: true,
         };
         debug_assert!(hole.is_consistent(), "bounds enclose the diameter: {hole:?}");
@@ -358,22 +361,21 @@ impl HoleFinder {
 impl Best {
     /// Whether a point lies in a section of this length, within the search radius of a sample.
     fn is_within(&self, length_m: f64) -> bool {
-        let is_inside = (-ROUNDING_M..=length_m + ROUNDING_M).contains(&self.x_m);
+        let is_inside = (-ROUNDING_M..=length_m + ROUNDING_M).contains(&self.at.x_m);
         is_inside && (0.0..=FARTHEST_M + ROUNDING_M).contains(&self.distance_m)
     }
 
-    fn take(&mut self, distance_m: f64, x_m: f64, arc_m: f64) {
+    fn take(&mut self, distance_m: f64, at: WallPoint) {
         if distance_m > self.distance_m {
-            *self = Self { distance_m, x_m, arc_m, ..*self };
+            *self = Self { distance_m, at, ..*self };
         }
     }
 }
 
 /// Evaluates a tile's centre: sets its owner and bound, and updates the best point.
 fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Result<Tile, Beyond> {
-    let beyond = Beyond { x_m: tile.x_m, arc_m: tile.arc_m };
-    let found = window.nearest(tile.x_m, tile.arc_m, within_m).ok_or(beyond)?;
-    best.take(math::sqrt(found.distance2), tile.x_m, tile.arc_m);
+    let found = window.nearest(tile.centre(), within_m).ok_or(Beyond(tile.centre()))?;
+    best.take(math::sqrt(found.distance2), tile.centre());
     let owner = tile.relative(&found, window.perimeter_m());
     let (dx, darc) = (owner.0.abs() + tile.half_x_m, owner.1.abs() + tile.half_arc_m);
     let bound_m = tile.bound_m.min(math::sqrt(dx * dx + darc * darc));
@@ -385,14 +387,14 @@ fn cell_m(reach_m: f64) -> f64 {
     (reach_m / 3.0).clamp(0.05, 0.5)
 }
 
-fn unbounded(window: &Window, beyond: &Beyond) -> Hole {
+fn unbounded(window: &Window, Beyond(at): &Beyond) -> Hole {
     let diameter_m = 2.0 * FARTHEST_M;
     Hole {
         diameter_m,
         least_m: diameter_m,
         most_m: f64::INFINITY,
-        x_m: window.chainage_m(beyond.x_m),
-        arc_m: math::wrap(beyond.arc_m, window.perimeter_m()),
+        x_m: window.chainage_m(at.x_m),
+        arc_m: math::wrap(at.arc_m, window.perimeter_m()),
         bounded: false,
     }
 }

@@ -5,6 +5,7 @@
 use super::store::{SampleStore, StoreError, WallSample};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 
 /// A declared opening of the wall.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,17 +41,17 @@ impl Opening {
     }
 
     /// Returns the number of samples that fill the opening.
-    pub fn places(&self, perimeter_m: f64, target_m: f64) -> i64 {
-        let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
+    pub fn places(&self, perimeter_m: f64, target: Target) -> i64 {
+        let (along, around) = self.counts(perimeter_m, spacing_m(target));
         (along + 1) * (around + 1)
     }
 
     /// Fills the opening with samples, so that a hole extends into it by at most half of their spacing.
     ///
     /// Errors: the store is full, or the opening lies outside the store's extent.
-    pub fn fill(&self, store: &mut SampleStore, target_m: f64) -> Result<(), StoreError> {
+    pub fn fill(&self, store: &mut SampleStore, target: Target) -> Result<(), StoreError> {
         let perimeter_m = store.perimeter_m();
-        let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
+        let (along, around) = self.counts(perimeter_m, spacing_m(target));
         let (first_m, length_m) = self.arc(perimeter_m);
         for i in 0..=along {
             let x_m = self.from_m + (self.to_m - self.from_m) * i as f64 / along as f64;
@@ -72,8 +73,8 @@ impl Opening {
     }
 }
 
-fn spacing_m(target_m: f64) -> f64 {
-    SPACING_M.min(target_m / 10.0)
+fn spacing_m(target: Target) -> f64 {
+    SPACING_M.min(target.max_hole_m / 10.0)
 }
 
 #[cfg(test)]
@@ -108,7 +109,7 @@ mod tests {
             }
         }
         if with_opening {
-            gate().fill(&mut store, 0.8).unwrap();
+            gate().fill(&mut store, Target::new(0.8)).unwrap();
         }
         store
     }
@@ -152,8 +153,8 @@ mod tests {
                 capacity: 100_000,
             };
             let mut store = SampleStore::new(layout);
-            gate().fill(&mut store, target_m).unwrap();
-            let counted = gate().places(profile.perimeter_m(), target_m);
+            gate().fill(&mut store, Target::new(target_m)).unwrap();
+            let counted = gate().places(profile.perimeter_m(), Target::new(target_m));
             let filled = i64::try_from(store.usage().kept + store.usage().thinned).unwrap();
             assert_eq!((counted, filled), (expected, expected), "{target_m}");
         }

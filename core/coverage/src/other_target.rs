@@ -4,6 +4,7 @@ use super::frontier::{Outlook, clear_of};
 use super::hole::Hole;
 use super::section::{Section, Verdict};
 use super::sections::{Sections, verdict};
+use headrace_sampling::Target;
 
 /// Inputs for the verdict on a section's hole that don't depend on the target.
 #[derive(Debug, Clone, Copy)]
@@ -27,23 +28,19 @@ impl Sections {
     /// The counted visits and the settled sections are still those for the dive's own target. A replay with the other
     /// target gives the verdicts that the dive would have reported.
     pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
+        let target = Target { max_hole_m: target_m, ..self.target() };
         self.sections_of(outlook.way).filter_map(move |index| {
-            Some((index, self.verdict_of(&Measured::of(self.get(index)?)?, target_m, outlook)))
+            Some((index, verdict_of(&Measured::of(self.get(index)?)?, target, outlook)))
         })
     }
+}
 
-    fn verdict_of(
-        &self,
-        Measured { hole, sd_m, doubtful }: &Measured,
-        target_m: f64,
-        outlook: &Outlook,
-    ) -> Verdict {
-        let error_m = self.confidence_sd() * sd_m;
-        let clear_m = clear_of(outlook.to_come, hole.x_m).min(clear_of(outlook.not_passed, hole.x_m));
-        match verdict(hole, error_m, target_m, clear_m) {
-            Verdict::Pass if *doubtful => Verdict::CannotSay,
-            said => said,
-        }
+fn verdict_of(measured: &Measured, target: Target, outlook: &Outlook) -> Verdict {
+    let Measured { hole, sd_m, doubtful } = *measured;
+    let clear_m = clear_of(outlook.to_come, hole.x_m).min(clear_of(outlook.not_passed, hole.x_m));
+    match verdict(&hole, sd_m, target, clear_m) {
+        Verdict::Pass if doubtful => Verdict::CannotSay,
+        said => said,
     }
 }
 
@@ -89,7 +86,7 @@ mod tests {
                 still_zone: None,
             };
             let mut finder = HoleFinder::default();
-            let mut seen = Self { sections: Sections::new(0.25, 0.5, 0.0, 10.0), outlook };
+            let mut seen = Self { sections: Sections::new(0.25, Target::new(0.5), 0.0, 10.0), outlook };
             for index in seen.sections.sections_of(seen.outlook.way) {
                 let mut judging = Judging {
                     store: &store,

@@ -11,6 +11,7 @@ use super::visits::{Visit, Visits};
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 
 /// Coverage verdict on a section. Source: docs/why/coverage.md, "Verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -185,10 +186,10 @@ impl Section {
     /// Whether verdict, hole, flag and evidence of a section that was just judged agree.
     ///
     /// A pass has a hole with D + k sd <= T. A fail has evidence and a flag. Only an open section is not inspected.
-    pub(super) fn is_consistent(&self, target_m: f64, confidence_sd: f64) -> bool {
-        let error_m = confidence_sd * self.hole_sd_m;
+    pub(super) fn is_consistent(&self, target: Target) -> bool {
+        let error_m = target.error_m(self.hole_sd_m);
         let is_judged = self.hole.is_some_and(|hole| hole.is_consistent()) && error_m >= 0.0;
-        let is_small = |hole: Hole| hole.bounded && hole.most_m + error_m <= target_m;
+        let is_small = |hole: Hole| hole.bounded && hole.most_m + error_m <= target.max_hole_m;
         is_judged
             && match self.verdict {
                 Verdict::Pass => self.settled && !self.is_flagged() && self.hole.is_some_and(is_small),

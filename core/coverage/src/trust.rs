@@ -39,6 +39,14 @@ pub(super) struct Others {
     pub(super) change: bool,
 }
 
+/// Disagreement of a return with the returns before it.
+pub(super) struct Disagreement {
+    /// Difference from the previous return, m; `None` if both agree.
+    pub(super) jump_m: Option<f64>,
+    /// Number of returns that this return made doubtful.
+    pub(super) doubtful: u32,
+}
+
 /// Counts of a head's returns over half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct HalfTurn {
@@ -170,15 +178,11 @@ impl HeadTrust {
     /// Adds a return.
     ///
     /// Returns the reason if the head is distrusted from now on, with the chainages of its recent returns.
-    ///
-    /// `jump_m` is the difference from the previous return, m, if both disagree. `doubtful` is the number of returns
-    /// that this return made doubtful.
     pub(super) fn note(
         &mut self,
         placed: &PlacedReturn,
         beam: &Beam<'_>,
-        jump_m: Option<f64>,
-        doubtful: u32,
+        Disagreement { jump_m, doubtful }: Disagreement,
         limits: &WallLimits,
         others: &Others,
     ) -> Option<(Distrust, [f64; 2])> {

@@ -12,7 +12,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::relief::Relief;
-use super::trust::{Beam, Distrust, HeadTrust, Others};
+use super::trust::{Beam, Disagreement, Distrust, HeadTrust, Others};
 use super::wall_limits::{PlacedReturn, WallLimits};
 
 /// Classification of a return.
@@ -150,7 +150,7 @@ impl HeadWall {
             before.filter(|_| last.is_none() && !both_design).map(|other| placed.off_m - other.off_m);
         let doubtful = if waiting == Some(Taken::Doubtful) { waited.count() } else { 0 };
         let others = Others { ballot: relief.ballot(head), change: relief.others_change(head) };
-        let distrusted = self.trust.note(&placed, beam, jump_m, doubtful, limits, &others);
+        let distrusted = self.trust.note(&placed, beam, Disagreement { jump_m, doubtful }, limits, &others);
         relief.note_changing(head, !self.trust.is_stuck(limits));
         relief.believe(head, self.distrusted().is_none());
         if self.distrusted().is_some() {

@@ -9,7 +9,7 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::console::Who;
-pub use super::observations::Occurrences;
+pub use super::observations::{Occurrence, Occurrences};
 use super::pilot_text::{AdviceFigures, CauseFigures};
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;

@@ -112,13 +112,13 @@ impl Alerter {
         let Update { at, situation, doubts, fix, sd } = update;
         let turning = (0..).zip(&situation.heads).filter(|(_, motion)| motion.is_some());
         let turning = turning.fold(HeadSet::default(), |set, (head, _)| set.with(head));
-        let reserved_m = self.state.confidence_sd * situation.pass_error_m;
+        let reserved_m = self.state.target.error_m(situation.pass_error_m);
         self.state = LiveState {
             at: Some(*at),
             position: match fix {
                 Err(lacking) => PositionState::None(*lacking),
                 Ok(_) if doubts.cable.is_some() => PositionState::Doubtful(PositionDoubt::Cable),
-                Ok(_) if reserved_m > SPREAD_SHARE * self.state.target_m => {
+                Ok(_) if reserved_m > SPREAD_SHARE * self.state.target.max_hole_m => {
                     PositionState::Doubtful(PositionDoubt::Spread)
                 }
                 Ok(_) => PositionState::Ok,

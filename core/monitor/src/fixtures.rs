@@ -16,6 +16,7 @@ use headrace_geometry::math;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::{Profile, shapes};
+use headrace_sampling::Target;
 use headrace_sampling::advice::{Advice, Advisor, Looks, Task};
 use headrace_sampling::head::{HeadSet, MAX_HEADS};
 use headrace_sampling::layout::HeadLayout;
@@ -45,7 +46,7 @@ pub(crate) fn coverage() -> Coverage {
     let (perimeter_m, from_m, to_m) = (pipe().perimeter_m(), 0.0, 32.0);
     Coverage {
         store: SampleStore::new(StoreLayout { perimeter_m, from_m, to_m, cell_m: 0.25, capacity: 10_000 }),
-        sections: Sections::new(0.25, 0.5, from_m, to_m),
+        sections: Sections::new(0.25, Target::new(0.5), from_m, to_m),
         frontier: Frontier::default(),
         soundings: Soundings::new(GridLayout { perimeter_m, from_m, to_m, node_m: 0.5 }),
         unsure: None,
@@ -88,8 +89,7 @@ pub(crate) fn situation(x_m: Option<f64>) -> Situation {
 /// Target of half a metre at a confidence of two standard deviations, in a tunnel of 100 m.
 pub(crate) fn task() -> Task {
     Task {
-        target_m: 0.5,
-        confidence_sd: 2.0,
+        target: Target::new(0.5),
         length_m: 100.0,
         layout: HeadLayout::PhaseShift,
         sound_speed_mps: 1447.0,

@@ -399,7 +399,7 @@ fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) ->
         back_to_m: sections.back_to_m(from_m),
         figures: evidence.into(),
         hole_arc_m: hole.arc_m,
-        target_m: sections.target_m(),
+        target_m: sections.target().max_hole_m,
         v_max_mps: dive.view().live_state().v_max_mps().unwrap_or(0.0),
     };
     LiveMessage::Flag { run: id.0, from_m, cause: evidence.cause, causes: evidence.causes, missed }

@@ -15,6 +15,7 @@ use headrace_fusion::NoFix;
 use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::Target;
 use headrace_sampling::advice::{Advice, Reason};
 use headrace_sampling::head::HeadSet;
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
@@ -178,10 +179,8 @@ pub struct LiveState {
     pub speed_mps: Option<f64>,
     /// Speed advice at the last update; `None` before the first.
     pub advice: Option<Advice>,
-    /// Coverage target T.
-    pub target_m: f64,
-    /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
-    pub confidence_sd: f64,
+    /// Coverage target, with the confidence of verdicts.
+    pub target: Target,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Largest distance of a head before or behind the vehicle's origin, m.
@@ -215,12 +214,12 @@ pub struct LiveState {
 stateful!(LiveState {
     state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, observations, turning, deaf, hung;
     slots: heard;
-    fixed: target_m, confidence_sd, length_m, heads_reach_m, heads, sources;
+    fixed: target, length_m, heads_reach_m, heads, sources;
 });
 
 impl LiveState {
     /// State before the first update, in a tunnel of unlimited length.
-    pub(super) fn new(target_m: f64, confidence_sd: f64, heads: u64, sources: u16) -> Self {
+    pub(super) fn new(target: Target, heads: u64, sources: u16) -> Self {
         Self {
             now: MonoNs(0),
             at: None,
@@ -231,8 +230,7 @@ impl LiveState {
             stand_s: 0,
             speed_mps: None,
             advice: None,
-            target_m,
-            confidence_sd,
+            target,
             length_m: f64::INFINITY,
             heads_reach_m: 0.0,
             metres: LiveMetres::default(),

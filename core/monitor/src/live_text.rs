@@ -174,7 +174,7 @@ fn condition_text(
         Condition::NoSpeed => no_speed_text(state, profile, heads),
         Condition::TurnFails | Condition::TurnUnsure => turn_text(words.name, state),
         Condition::CannotSay(PositionDoubt::Spread) => {
-            format!("{}: position ±{:.2} m", words.name, state.confidence_sd * state.pass_sd_m)
+            format!("{}: position ±{:.2} m", words.name, state.target.error_m(state.pass_sd_m))
         }
         Condition::Good => format!("ok up to {v_max}"),
         Condition::NoData
@@ -229,7 +229,7 @@ fn losses_text(state: &LiveState) -> Option<String> {
 fn forecast_text(state: &LiveState) -> Option<String> {
     let advice = state.advice.as_ref().filter(|_| state.v_max_mps().is_some())?;
     Some(match advice.predicted_t_m {
-        Some(t_m) => format!("turn {t_m:.2} m (limit {:.2})", state.target_m),
+        Some(t_m) => format!("turn {t_m:.2} m (limit {:.2})", state.target.max_hole_m),
         None => "turn: unseen wall".to_owned(),
     })
 }

@@ -16,6 +16,7 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SourceId};
 
@@ -57,7 +58,7 @@ pub enum Outcome {
     },
     /// No sample, for this reason. The aim is the point at which the beam meets the design profile, if it is
     /// known.
-    Lost(Loss, Option<Aim>),
+    Lost(Loss, Option<WallPoint>),
     /// A return that can't be placed, with the reason for the missing fix.
     Unplaced(NoFix),
 }
@@ -71,15 +72,6 @@ pub enum Hidden {
     Beside,
     /// The beam is occluded.
     Yes,
-}
-
-/// Point at which a beam meets the design profile.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Aim {
-    /// Chainage of the point, m.
-    pub x_m: f64,
-    /// Arc length of the point, m.
-    pub arc_m: f64,
 }
 
 /// A georeferenced ping.

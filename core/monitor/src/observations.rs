@@ -58,6 +58,15 @@ impl ObservedKind {
     }
 }
 
+/// An occurrence of an observation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Occurrence {
+    /// Chainage, m.
+    pub x_m: f64,
+    /// Deviation, m; see [`Occurrences::worst_m`].
+    pub off_m: f64,
+}
+
 /// Occurrences of an observation over the whole dive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Occurrences {
@@ -94,9 +103,9 @@ pub(crate) struct Observation {
 pub(crate) struct Observations([Option<Observation>; MOST_OBSERVATIONS]);
 
 impl Observations {
-    /// Records an occurrence at a chainage with its deviation, m. Returns true for the first occurrence.
-    pub(crate) fn note(&mut self, kind: ObservedKind, at: MonoNs, x_m: f64, off_m: f64) -> bool {
-        self.note_of(None, kind, at, x_m, off_m)
+    /// Records an occurrence of an observation. Returns true for the first occurrence.
+    pub(crate) fn note(&mut self, kind: ObservedKind, at: MonoNs, occurrence: Occurrence) -> bool {
+        self.note_of(None, kind, at, occurrence)
     }
 
     /// Records an occurrence that concerns a head, or the velocity log that the cable counter differs from.
@@ -107,8 +116,7 @@ impl Observations {
         source: Option<SourceId>,
         kind: ObservedKind,
         at: MonoNs,
-        x_m: f64,
-        off_m: f64,
+        Occurrence { x_m, off_m }: Occurrence,
     ) -> bool {
         let is_it = |known: &Observation| known.kind == kind && known.source == source;
         let Some(slot) = self.0.iter_mut().find(|slot| slot.as_ref().is_none_or(is_it)) else { return false };
@@ -132,15 +140,14 @@ impl Observations {
         source: Option<SourceId>,
         kind: ObservedKind,
         since: MonoNs,
-        x_m: f64,
-        off_m: f64,
+        occurrence: Occurrence,
     ) -> bool {
         match self.get_mut(kind, source) {
             Some(known) if known.latest == since => {
-                known.occurrences.worst_m = known.occurrences.worst_m.max(off_m);
+                known.occurrences.worst_m = known.occurrences.worst_m.max(occurrence.off_m);
                 false
             }
-            _ => self.note_of(source, kind, since, x_m, off_m),
+            _ => self.note_of(source, kind, since, occurrence),
         }
     }
 
@@ -152,7 +159,7 @@ impl Observations {
         let known = self.get_mut(kind, None).and_then(|known| known.setting);
         let is_new = known.is_none_or(|known| !known.is_of_same(doubt));
         if is_new {
-            self.note(kind, at, x_m, 0.0);
+            self.note(kind, at, Occurrence { x_m, off_m: 0.0 });
         }
         if let Some(known) = self.get_mut(kind, None) {
             known.setting = Some(*doubt);

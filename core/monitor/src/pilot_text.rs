@@ -6,7 +6,7 @@
 use super::advice_log::AdviceEntry;
 use super::head_descriptions::HeadDescriptions;
 use super::live_state::{Condition, LEAST_MPS};
-use super::observations::ObservedKind;
+use super::observations::{ObservedKind, Occurrence};
 use super::words::{condition_words, limit_words};
 use serde::{Deserialize, Serialize};
 
@@ -310,16 +310,15 @@ pub fn cleared_text(from_m: f64, to_m: f64) -> String {
 
 /// Text of an observation that a log has in `judgements`; `None` if no kind of observation has this number.
 ///
-/// `x_m` is the chainage, m; `off_m` the deviation, m; `head` the head or velocity log, if it names one.
-pub fn recorded_observation_text(kind: u64, head: &str, x_m: f64, off_m: f64) -> Option<String> {
+/// `head` is the head or velocity log, if the observation names one.
+pub fn recorded_observation_text(kind: u64, head: &str, occurrence: Occurrence) -> Option<String> {
     let kind = ObservedKind::ALL.into_iter().find(|known| *known as u64 == kind)?;
-    Some(observation_text(kind, head, x_m, off_m))
+    Some(observation_text(kind, head, occurrence))
 }
 
-/// Text of an observation at a chainage, m. `off_m` is the deviation, m; `head` is the head or velocity log,
-/// if the observation names one.
-pub(super) fn observation_text(kind: ObservedKind, head: &str, x_m: f64, off_m: f64) -> String {
-    let x = station(x_m);
+/// Text of an observation. `head` is the head or velocity log, if the observation names one.
+pub(super) fn observation_text(kind: ObservedKind, head: &str, occurrence: Occurrence) -> String {
+    let (x, off_m) = (station(occurrence.x_m), occurrence.off_m);
     match kind {
         ObservedKind::OutsideTunnel => {
             format!("ch {x}  samples {off_m:.2} m outside the tunnel: check the tether's zero")

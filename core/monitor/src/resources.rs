@@ -15,6 +15,7 @@ use headrace_geometry::site::Site;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 use headrace_sampling::layout::HeadLayout;
 
 /// The tunnel as designed, and the water in it.
@@ -53,11 +54,11 @@ impl TunnelDesign {
     }
 }
 
-/// Coverage target, and the settings that affect whether it is met.
+/// Target and settings by which the driving of a dive is judged.
 #[derive(Debug, Clone, Copy, Resource)]
-pub struct Target {
-    /// Target T: the largest hole allowed, m.
-    pub target_m: f64,
+pub struct Plan {
+    /// Coverage target, with the confidence of verdicts.
+    pub target: Target,
     /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
     /// Speed for which the heads are set in phase, m/s; zero if none is planned.

@@ -50,6 +50,85 @@ pub enum WordKind {
     Number,
 }
 
+/// Words of a sample, and of a doubtful return.
+const SAMPLE: [(&str, WordKind); 7] = [
+    ("received_ns", WordKind::Integer),
+    ("source", WordKind::Integer),
+    ("outcome", WordKind::Integer),
+    ("x_m", WordKind::Number),
+    ("y_m", WordKind::Number),
+    ("z_m", WordKind::Number),
+    ("arc_m", WordKind::Number),
+];
+/// Words of a ping without a sample.
+const NO_SAMPLE: [(&str, WordKind); 4] = [
+    ("received_ns", WordKind::Integer),
+    ("source", WordKind::Integer),
+    ("outcome", WordKind::Integer),
+    ("reason", WordKind::Integer),
+];
+/// Words of advice.
+const ADVICE: [(&str, WordKind); 11] = [
+    ("at_ns", WordKind::Integer),
+    ("v_max_mps", WordKind::Number),
+    ("reason", WordKind::Integer),
+    ("will_exceed", WordKind::Integer),
+    ("phase_error_rad", WordKind::Number),
+    ("t_y_m", WordKind::Number),
+    ("unseen_width_m", WordKind::Number),
+    ("unseen_arc_m", WordKind::Number),
+    ("remedy", WordKind::Integer),
+    ("remedy_mode", WordKind::Integer),
+    ("remedy_mode_rest", WordKind::Integer),
+];
+/// Words of a pose.
+const POSE: [(&str, WordKind); 13] = [
+    ("at_ns", WordKind::Integer),
+    ("x_m", WordKind::Number),
+    ("y_m", WordKind::Number),
+    ("z_m", WordKind::Number),
+    ("w", WordKind::Number),
+    ("i", WordKind::Number),
+    ("j", WordKind::Number),
+    ("k", WordKind::Number),
+    ("speed_mps", WordKind::Number),
+    // Present only if navigation provides standard deviations.
+    ("along_sd_m", WordKind::Number),
+    ("place_sd_m", WordKind::Number),
+    ("tilt_sd_rad", WordKind::Number),
+    ("yaw_sd_rad", WordKind::Number),
+];
+/// Words of the live state.
+const STATE: [(&str, WordKind); 19] = [
+    ("at_ns", WordKind::Integer),
+    ("position", WordKind::Integer),
+    ("chainage_m", WordKind::Number),
+    ("pass_sd_m", WordKind::Number),
+    ("stand_s", WordKind::Integer),
+    ("speed_mps", WordKind::Number),
+    ("v_max_mps", WordKind::Number),
+    ("reason", WordKind::Integer),
+    ("predicted_t_m", WordKind::Number),
+    ("pass_m", WordKind::Number),
+    ("fail_m", WordKind::Number),
+    ("cannot_say_m", WordKind::Number),
+    ("open_m", WordKind::Number),
+    ("not_inspected_m", WordKind::Number),
+    ("unsure", WordKind::Integer),
+    ("unsure_from", WordKind::Integer),
+    ("unsure_to", WordKind::Integer),
+    ("alerts", WordKind::Integer),
+    ("turning", WordKind::Integer),
+];
+/// Words of the first occurrence of an observation.
+const ALERT: [(&str, WordKind); 5] = [
+    ("at_ns", WordKind::Integer),
+    ("kind", WordKind::Integer),
+    ("x_m", WordKind::Number),
+    ("off_m", WordKind::Number),
+    // Present only if the observation names a source.
+    ("source", WordKind::Integer),
+];
 /// Names and types of the words in a judged section's record.
 const SECTION: [(&str, WordKind); 17] = [
     ("at_ns", WordKind::Integer),
@@ -154,94 +233,32 @@ impl RecordKind {
 
     /// Name and type of the record's word at index `place`.
     pub fn field(self, place: usize) -> (&'static str, WordKind) {
-        use WordKind::{Integer, Number};
-        let fields: &[(&str, WordKind)] = match self {
-            Self::Sample | Self::Doubtful => &[
-                ("received_ns", Integer),
-                ("source", Integer),
-                ("outcome", Integer),
-                ("x_m", Number),
-                ("y_m", Number),
-                ("z_m", Number),
-                ("arc_m", Number),
-            ],
-            Self::NoSample => {
-                &[("received_ns", Integer), ("source", Integer), ("outcome", Integer), ("reason", Integer)]
-            }
-            Self::Section => &SECTION,
-            Self::Run => &[("id", Integer), ("change", Integer)],
-            Self::Advice => &[
-                ("at_ns", Integer),
-                ("v_max_mps", Number),
-                ("reason", Integer),
-                ("will_exceed", Integer),
-                ("phase_error_rad", Number),
-                ("t_y_m", Number),
-                ("unseen_width_m", Number),
-                ("unseen_arc_m", Number),
-                ("remedy", Integer),
-                ("remedy_mode", Integer),
-                ("remedy_mode_rest", Integer),
-            ],
-            Self::Pose => &[
-                ("at_ns", Integer),
-                ("x_m", Number),
-                ("y_m", Number),
-                ("z_m", Number),
-                ("w", Number),
-                ("i", Number),
-                ("j", Number),
-                ("k", Number),
-                ("speed_mps", Number),
-                // Present only if navigation provides standard deviations.
-                ("along_sd_m", Number),
-                ("place_sd_m", Number),
-                ("tilt_sd_rad", Number),
-                ("yaw_sd_rad", Number),
-            ],
-            Self::State => &[
-                ("at_ns", Integer),
-                ("position", Integer),
-                ("chainage_m", Number),
-                ("pass_sd_m", Number),
-                ("stand_s", Integer),
-                ("speed_mps", Number),
-                ("v_max_mps", Number),
-                ("reason", Integer),
-                ("predicted_t_m", Number),
-                ("pass_m", Number),
-                ("fail_m", Number),
-                ("cannot_say_m", Number),
-                ("open_m", Number),
-                ("not_inspected_m", Number),
-                ("unsure", Integer),
-                ("unsure_from", Integer),
-                ("unsure_to", Integer),
-                ("alerts", Integer),
-                ("turning", Integer),
-            ],
-            Self::NoPose => &[("at_ns", Integer), ("reason", Integer)],
-            Self::Alert => &[
-                ("at_ns", Integer),
-                ("kind", Integer),
-                ("x_m", Number),
-                ("off_m", Number),
-                // The word `source` is present only if the observation names a source.
-                ("source", Integer),
-            ],
-            Self::AlertChange => &ALERT_CHANGE,
-            Self::Note => &NOTE,
-            Self::Voice => &VOICE,
-        };
         // All words beyond the last field have the same name and type. They are the speeds that alternative
         // modes allow (advice), the time of each source's last reading (live state), or the text (note).
         let beyond = match self {
-            Self::Advice => ("alternative_v_max_mps", Number),
-            Self::State => ("heard_ns", Integer),
-            Self::Note => ("text", Integer),
-            _ => ("beyond the last field", Number),
+            Self::Advice => ("alternative_v_max_mps", WordKind::Number),
+            Self::State => ("heard_ns", WordKind::Integer),
+            Self::Note => ("text", WordKind::Integer),
+            _ => ("beyond the last field", WordKind::Number),
         };
-        fields.get(place).copied().unwrap_or(beyond)
+        self.fields().get(place).copied().unwrap_or(beyond)
+    }
+
+    fn fields(self) -> &'static [(&'static str, WordKind)] {
+        match self {
+            Self::Sample | Self::Doubtful => &SAMPLE,
+            Self::NoSample => &NO_SAMPLE,
+            Self::Section => &SECTION,
+            Self::Run => &[("id", WordKind::Integer), ("change", WordKind::Integer)],
+            Self::Advice => &ADVICE,
+            Self::Pose => &POSE,
+            Self::State => &STATE,
+            Self::NoPose => &[("at_ns", WordKind::Integer), ("reason", WordKind::Integer)],
+            Self::Alert => &ALERT,
+            Self::AlertChange => &ALERT_CHANGE,
+            Self::Note => &NOTE,
+            Self::Voice => &VOICE,
+        }
     }
 }
 

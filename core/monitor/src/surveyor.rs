@@ -196,7 +196,7 @@ mod tests {
     use super::*;
     use crate::entities::{Head, HiddenAngles, Mounted};
     use crate::fixtures::armed;
-    use crate::resources::{Target, TunnelDesign};
+    use crate::resources::{Plan, TunnelDesign};
 
     /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
@@ -207,7 +207,7 @@ mod tests {
             TypeId::of::<HeadEntities>(),
             TypeId::of::<HiddenAngles>(),
             TypeId::of::<Mounted>(),
-            TypeId::of::<Target>(),
+            TypeId::of::<Plan>(),
             TypeId::of::<TunnelDesign>(),
             TypeId::of::<Classified>(),
             TypeId::of::<Cursor>(),

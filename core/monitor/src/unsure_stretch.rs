@@ -33,12 +33,7 @@ pub struct UnsureStretch {
 impl UnsureStretch {
     /// Creates an unsure stretch from a stretch of sections.
     pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
-        Self::from_sections(stretch, sections.section_m(), sections.confidence_sd())
-    }
-
-    /// Creates an unsure stretch. `section_m` is the length of a section, m, and `confidence_sd` a number of
-    /// standard deviations.
-    pub(super) fn from_sections(stretch: &Stretch, section_m: f64, confidence_sd: f64) -> Self {
+        let section_m = sections.section_m();
         let [hole_m, hole_sd_m] = stretch.largest().hole_m;
         Self {
             why: stretch.why,
@@ -47,7 +42,7 @@ impl UnsureStretch {
             metres_m: f64::from(stretch.sections()) * section_m,
             hole_m,
             hole_sd_m,
-            hole_error_m: confidence_sd * hole_sd_m,
+            hole_error_m: sections.target().error_m(hole_sd_m),
             driven: stretch.largest().driven,
             is_mostly_error: stretch.is_mostly_error(),
         }

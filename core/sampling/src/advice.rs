@@ -16,6 +16,7 @@ use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::Ring;
 use super::strips::{Going, PARTS, Strips, View};
 use super::swing::Swing;
+use super::target::Target;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
@@ -53,10 +54,8 @@ struct Fastest {
 /// The inspection task that the advice is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {
-    /// Target T, m.
-    pub target_m: f64,
-    /// Number of standard deviations of a hole's size by which a passed section stays below the target.
-    pub confidence_sd: f64,
+    /// Target.
+    pub target: Target,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Layout of the heads.
@@ -248,7 +247,7 @@ impl Advisor {
             nearest_mps,
             reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
             predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
-            will_exceed: predicted_t_m > self.task.target_m,
+            will_exceed: predicted_t_m > self.task.target.max_hole_m,
             may_exceed: predicted_t_m > sure_m,
             sure_m,
             pass_gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
@@ -394,9 +393,14 @@ impl Advisor {
             // If the vehicle swings too much for any speed, it also does so at a slightly different position.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
             // The distance between samples that limits the speed is unknown.
-            Err(_) => (self.task.target_m, 0.0),
+            Err(_) => (self.task.target.max_hole_m, 0.0),
         };
-        ring_cache::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
+        ring_cache::still_m(
+            self.task.target.max_hole_m,
+            t_y_m,
+            self.profile.perimeter_m() / math::TAU,
+            swing_share,
+        )
     }
 
     /// Computes the largest speed in each mode common to all heads, and the cost of each margin.
@@ -449,7 +453,7 @@ impl Advisor {
 
     /// Returns the largest speeds as the margins of the target are added one after the other.
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: RemainingTarget) -> Margins {
-        let target_m = self.task.target_m;
+        let target_m = self.task.target.max_hole_m;
         let known = RemainingTarget { pass_error_m: 0.0, ..sure };
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         let (lossy, passes) = (passes, &passes.lossy(false));
@@ -524,8 +528,7 @@ impl Advisor {
     fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> RemainingTarget {
         let (even_gap_s, apart_m) = (passes.even_gap_s(), phasing.apart_m());
         RemainingTarget {
-            target_m: self.task.target_m,
-            confidence_sd: self.task.confidence_sd,
+            target: self.task.target,
             pass_error_m: situation.pass_error_m,
             measured_s: margin::error_time_s(1.0 / even_gap_s, apart_m, situation.speed_mps, APART_SHARE),
             even_gap_s,
@@ -544,7 +547,7 @@ impl Advisor {
     /// The order is: a steady heading, then the tunnel's centre if samples of a turn are close enough there, then the
     /// fastest mode.
     fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
-        let target_m = self.task.target_m;
+        let target_m = self.task.target.max_hole_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         if going.swing_mps.max(going.apart_swing_mps) > 0.0
             && self.now.bound_for_target(0, passes, target_m, &steady).is_ok()

@@ -3,6 +3,7 @@
 //! Plan, live advice and report use the same functions, so that the planned speed equals the advised speed.
 //! Source: docs/decisions/0005-advice-and-plan.md.
 
+use crate::Target;
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 
@@ -38,15 +39,16 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 
 /// Part of a target reserved for position errors, m.
 ///
-/// The margin is `confidence_sd` times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
+/// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
 /// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth
 /// of the target, and leaves at least three fifths of the distance between passes. With a larger margin, a slower
 /// speed would cost more than it gains.
-pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t_y_m: f64) -> f64 {
+pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
+    let target_m = target.max_hole_m;
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
     let least_m = math::sqrt(LEFT_SHARE * LEFT_SHARE * along_m2 + t_y_m * t_y_m);
     let most_m = (target_m - least_m).clamp(0.0, MOST_SHARE * target_m);
-    let margin_m = (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(most_m);
+    let margin_m = target.error_m((pass_error_m - NOTHING_M).max(0.0)).min(most_m);
     debug_assert!(
         (0.0..=MOST_SHARE * target_m).contains(&margin_m),
         "a margin is at most a fifth of the target of {target_m} m: {margin_m} m"
@@ -66,10 +68,8 @@ const GROWTH: f64 = 0.7;
 /// apart along the hull is twice as long, and the margin is larger.
 #[derive(Debug, Clone, Copy)]
 pub struct RemainingTarget {
-    /// Target T, m.
-    pub target_m: f64,
-    /// Number of standard deviations of a hole's size by which a passed section stays below the target.
-    pub confidence_sd: f64,
+    /// Target.
+    pub target: Target,
     /// Standard deviation of a hole's size as measured at the present speed, m.
     pub pass_error_m: f64,
     /// Value of [`error_time_s`] when `pass_error_m` was measured, seconds.
@@ -90,7 +90,7 @@ impl RemainingTarget {
         let same = self.measured_s <= 0.0 || (time_s - self.measured_s).abs() <= f64::EPSILON * time_s;
         let growth = if same { 1.0 } else { math::exp(GROWTH * math::ln(time_s / self.measured_s)) };
         let error_m = self.pass_error_m * growth;
-        self.target_m - position_margin_m(self.target_m, self.confidence_sd, error_m, self.t_y_m)
+        self.target.max_hole_m - position_margin_m(self.target, error_m, self.t_y_m)
     }
 
     /// Returns the target minus the margin for position errors at unlimited speed, m.
@@ -227,9 +227,11 @@ impl Margins {
 mod tests {
     use super::*;
 
+    const TARGET: Target = Target { max_hole_m: 0.5, confidence_sd: 2.0 };
+
     #[test]
     fn position_margin_is_a_limited_multiple_of_the_standard_deviation() {
-        let margin_m = |pass_error_m: f64, t_y_m: f64| position_margin_m(0.5, 2.0, pass_error_m, t_y_m);
+        let margin_m = |pass_error_m: f64, t_y_m: f64| position_margin_m(TARGET, pass_error_m, t_y_m);
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
         assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
@@ -242,9 +244,9 @@ mod tests {
 
     #[test]
     fn position_margin_is_continuous() {
-        let mut before = position_margin_m(0.5, 2.0, 0.0, 0.3);
+        let mut before = position_margin_m(TARGET, 0.0, 0.3);
         for k in 1..=2000 {
-            let now = position_margin_m(0.5, 2.0, 1e-4 * f64::from(k), 0.3);
+            let now = position_margin_m(TARGET, 1e-4 * f64::from(k), 0.3);
             assert!((0.0..=2.1e-4).contains(&(now - before)), "{k}");
             before = now;
         }
@@ -265,8 +267,7 @@ mod tests {
     #[test]
     fn margin_does_not_depend_on_the_speed_at_which_errors_were_measured() {
         let sure = RemainingTarget {
-            target_m: 0.5,
-            confidence_sd: 2.0,
+            target: TARGET,
             pass_error_m: 0.012,
             measured_s: error_time_s(0.25, 0.8, 0.1, APART_SHARE),
             even_gap_s: 4.0,

@@ -15,6 +15,7 @@ use super::passes::{self, Passes};
 use super::ring::{Ring, Standing};
 use super::schedule::Schedule;
 use super::strips::{Arc, Going, Sector, Strips, View};
+use super::target::Target;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math::TAU;
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -193,9 +194,14 @@ impl Planner {
 
     /// Returns the margin for position errors in a mode at a speed, m.
     fn margin_m(&self, planned: &PlannedMode, target_m: f64, speed_mps: f64) -> f64 {
+        let target = self.target(target_m);
+        margin::position_margin_m(target, self.pass_error_m(planned, speed_mps), planned.t_y2_m)
+    }
+
+    /// Target with the confidence of the expected errors; without them, the confidence is zero.
+    fn target(&self, max_hole_m: f64) -> Target {
         let confidence_sd = self.errors.as_ref().map_or(0.0, |errors| errors.confidence_sd);
-        let pass_error_m = self.pass_error_m(planned, speed_mps);
-        margin::position_margin_m(target_m, confidence_sd, pass_error_m, planned.t_y2_m)
+        Target { max_hole_m, confidence_sd }
     }
 
     /// Standard deviation of a hole's size between two passes in a mode at a speed, m; zero if unknown.

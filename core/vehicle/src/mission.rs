@@ -3,6 +3,7 @@
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 use headrace_sampling::advice::Looks;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::occlusion::Obstacle;
@@ -19,8 +20,8 @@ pub struct Mission {
     pub site: Site,
     /// Depth sensor whose temperature determines the speed of sound, instead of the site's value.
     pub sound_speed_from: Option<String>,
-    /// Target T: the largest hole allowed, m.
-    pub target_m: f64,
+    /// Coverage target, with the confidence of verdicts.
+    pub target: Target,
     /// Length of a section, m.
     pub section_m: f64,
     /// Length of the tunnel, m; samples beyond it are counted but not stored.
@@ -54,7 +55,7 @@ impl Mission {
             profile,
             site: Site::default(),
             sound_speed_from: None,
-            target_m,
+            target: Target::new(target_m),
             section_m: 0.25,
             length_m: 100.0,
             layout: HeadLayout::PhaseShift,
@@ -70,9 +71,10 @@ impl Mission {
 
     /// Whether lengths are positive, and speeds, tolerances and confidence aren't negative.
     pub fn is_valid(&self) -> bool {
-        let Self { target_m, section_m, length_m, planned_speed_mps, coverage, .. } = self;
-        let CoverageConfig { hole_tolerance_m, contradiction_m, node_m, confidence_sd, .. } = coverage;
-        [target_m, section_m, length_m, contradiction_m, node_m].iter().all(|length_m| **length_m > 0.0)
+        let Self { target, section_m, length_m, planned_speed_mps, coverage, .. } = self;
+        let Target { max_hole_m, confidence_sd } = target;
+        let CoverageConfig { hole_tolerance_m, contradiction_m, node_m, .. } = coverage;
+        [max_hole_m, section_m, length_m, contradiction_m, node_m].iter().all(|length_m| **length_m > 0.0)
             && [planned_speed_mps, hole_tolerance_m, confidence_sd].iter().all(|number| **number >= 0.0)
     }
 

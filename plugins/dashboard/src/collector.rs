@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 
 use headrace_geometry::frames::{Mount, Point3, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::WallPoint;
 use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::live_text::{message_line, status_line};
@@ -395,7 +396,7 @@ impl Collector {
         let Some([from_m, to_m]) = self.lacking_m.take() else { return Vec::new() };
         let (profile, t_ms) = (&dive.mission().profile, self.t_ms(dive.now()));
         let mut mended = Vec::new();
-        dive.view().coverage().store.each_between(from_m, to_m, |x_m, arc_m, _| {
+        dive.view().coverage().store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {
             if mended.len() < MOST_SAMPLES {
                 let [y_m, z_m] = profile.point_at(arc_m).map(|value| value as f32);
                 let arc = SampleRecord::arc_of(arc_m, profile.perimeter_m());

@@ -3,6 +3,7 @@
 use headrace_coverage::{Cause, Unsure};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 use serde::Serialize;
 
 /// Number of points of the tunnel's profile sent to the page, spaced equally in arc length.
@@ -54,14 +55,12 @@ pub struct Site {
     pub dive: String,
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Target T, the largest hole that may pass, m.
-    pub target_m: f64,
+    /// Coverage target, with the confidence of verdicts.
+    pub target: Target,
     /// Second target, for which all sections are judged too, m; `None` without one.
     pub compared_m: Option<f64>,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Number of standard deviations by which a passing hole must be below the target.
-    pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Design profile of the tunnel's cross-section.
@@ -150,10 +149,10 @@ impl Site {
             mode: self.mode,
             dive: &self.dive,
             vehicle: &self.vehicle,
-            target_m: self.target_m,
+            target_m: self.target.max_hole_m,
             compared_m: self.compared_m,
             section_m: self.section_m,
-            confidence_sd: self.confidence_sd,
+            confidence_sd: self.target.confidence_sd,
             length_m: self.length_m,
             perimeter_m,
             profile: points.map(|arc_m| self.profile.point_at(arc_m).map(millimetres)).collect(),

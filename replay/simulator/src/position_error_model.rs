@@ -52,7 +52,7 @@ pub fn expected_errors(
     let scene = Scene::parse(Document::new("a calm dive", &text), kinds, load, None)?;
     let navigation = navigated(&scene, &Settings { learns: false, ..settings })?;
     Ok(Some(ExpectedErrors {
-        confidence_sd: vehicle.coverage.confidence_sd,
+        confidence_sd: vehicle.target.confidence_sd,
         by_time: by_time(&navigation, vehicle),
     }))
 }

@@ -281,7 +281,7 @@ fn loops_that_share_a_navigation_give_the_same_results_as_alone() {
     let asked = [(0.3, 0.25), (0.5, 0.25), (0.8, 1.0), (1.2, 0.5)];
     let vehicle = |(target_m, section_m): (f64, f64)| {
         let mut vehicle = scene.vehicle.mission();
-        (vehicle.target_m, vehicle.section_m) = (target_m, section_m);
+        (vehicle.target.max_hole_m, vehicle.section_m) = (target_m, section_m);
         vehicle
     };
     let loops = || -> Vec<Loop> {

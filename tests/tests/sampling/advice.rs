@@ -398,7 +398,7 @@ fn advice_in_the_field_changes_slowly_enough_to_read() {
     let jumps = a_minute(&beats[10..], jumps);
     let reasons = a_minute(&beats[10..], |a, b| a.advice.reason != b.advice.reason);
     let forecasts = a_minute(beats, |a, b| a.advice.will_exceed != b.advice.will_exceed);
-    let target_m = scene.vehicle.target_m;
+    let target_m = scene.vehicle.target.max_hole_m;
     let over = |beat: &AdviceEntry| beat.advice.predicted_t_m > Some(target_m);
     let crossings = a_minute(beats, |a, b| over(a) != over(b));
     println!(

@@ -8,6 +8,7 @@ use crate::missing_samples::MissingSample;
 use crate::passage::Drive;
 use crate::store::SampleStore;
 use headrace_geometry::math;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
 /// Share of the target that a hole may take up in the trial that removes the speed factor. A plan keeps the
@@ -196,7 +197,7 @@ impl<'a> Trial<'a> {
             // The range includes samples that the mirroring of the wall needs later.
             .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
             .filter(|lack| lack.why.is_within(removed))
-            .map(|lack| [lack.x_m, lack.arc_m]);
+            .map(|lack| WallPoint { x_m: lack.x_m, arc_m: lack.arc_m });
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
     }
 

@@ -5,6 +5,7 @@
 use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
+use headrace_geometry::tunnel::WallPoint;
 
 /// Search resolution as a share of the circle's radius. A circle whose radius exceeds the required one by
 /// less than this may be missed.
@@ -59,7 +60,7 @@ fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 
 impl HoleFinder {
     /// Lays out the wall with the changes `otherwise` and the additional samples `more`.
     ///
-    /// `more` contains chainage and arc length, m. The layout suffices for circles of up to `radius_m` centred
+    /// `more` contains further samples. The layout suffices for circles of up to `radius_m` centred
     /// between two chainages. Samples of visits from `first_visit` on count.
     ///
     /// Allocates: never.
@@ -69,7 +70,7 @@ impl HoleFinder {
         (from_m, to_m): (f64, f64),
         radius_m: f64,
         otherwise: &WallChanges,
-        more: impl Iterator<Item = [f64; 2]>,
+        more: impl Iterator<Item = WallPoint>,
     ) {
         self.laid_m = radius_m;
         let window = &mut self.window;
@@ -83,24 +84,23 @@ impl HoleFinder {
         let reach_m = radius_m + length_m;
         window.begin(perimeter_m, from_m, (-reach_m, length_m + reach_m), cell_m(radius_m));
         let mirror_m = otherwise.mirror_m();
-        let mut take = |x_m: f64, arc_m: f64| {
-            window.push((x_m - from_m) * along, arc_m * around);
+        let mut take = |WallPoint { x_m, arc_m }: WallPoint| {
+            window.push(WallPoint { x_m: (x_m - from_m) * along, arc_m: arc_m * around });
             if let Some(mirror_m) = mirror_m {
-                window.push((2.0 * mirror_m - x_m - from_m) * along, arc_m * around);
+                let x_m = (2.0 * mirror_m - x_m - from_m) * along;
+                window.push(WallPoint { x_m, arc_m: arc_m * around });
             }
         };
         let ends_m = [from_m - reach_m / along, to_m + reach_m / along];
         let stretches_m = mirror_m.map_or([Some(ends_m), None], |mirror_m| with_mirrored(ends_m, mirror_m));
         for [least_m, most_m] in stretches_m.into_iter().flatten() {
-            store.each_between(least_m, most_m, |x_m, arc_m, visit| {
+            store.each_between(least_m, most_m, |at, visit| {
                 if visit >= first_visit {
-                    take(x_m, arc_m);
+                    take(at);
                 }
             });
         }
-        for [x_m, arc_m] in more {
-            take(x_m, arc_m);
-        }
+        more.for_each(take);
         window.sort();
     }
 
@@ -149,7 +149,7 @@ mod tests {
         is_in: impl Fn(u32, u32) -> bool,
         radius_m: f64,
         otherwise: &WallChanges,
-        more: &[[f64; 2]],
+        more: &[WallPoint],
     ) -> bool {
         let layout = StoreLayout { perimeter_m: 10.0, from_m: 0.0, to_m: 10.0, cell_m: 0.25, capacity: 1000 };
         let mut store = SampleStore::new(layout);
@@ -169,7 +169,7 @@ mod tests {
         let hole_m = 0.5;
         assert!(has(gone, 0.99 * hole_m, &WallChanges::NOTHING, &[]));
         assert!(!has(gone, 1.03 * hole_m, &WallChanges::NOTHING, &[]));
-        assert!(!has(gone, 0.99 * hole_m, &WallChanges::NOTHING, &[[5.0, 2.0]]));
+        assert!(!has(gone, 0.99 * hole_m, &WallChanges::NOTHING, &[WallPoint { x_m: 5.0, arc_m: 2.0 }]));
     }
 
     #[test]

@@ -86,7 +86,7 @@ proptest! {
         let mut window = Window::default();
         window.fill((&store(PERIMETER_M, &samples), 0), 0.0, (-3.0, 4.0), cell_m);
         let expected = Some(nearest_m(PERIMETER_M, &samples, place)).filter(|d| *d <= within_m);
-        let found = window.nearest(place.0, place.1, within_m);
+        let found = window.nearest(WallPoint { x_m: place.0, arc_m: place.1 }, within_m);
         match (found, expected) {
             (Some(found), Some(expected)) => {
                 prop_assert!((math::sqrt(found.distance2) - expected).abs() < 1e-12);

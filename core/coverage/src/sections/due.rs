@@ -70,7 +70,7 @@ impl Sections {
         let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
         for range in [behind, ahead] {
             for index in clamp(range, &way) {
-                let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
+                let target = self.target;
                 let bounds_m = self.bounds_m(index);
                 let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
                 let may_fail = !section.is_flagged() && section.verdict == Verdict::Open;
@@ -89,8 +89,8 @@ impl Sections {
                 };
                 let clear_m = clear_of(moved.to_come, hole.x_m);
                 let left_m = hole.least_m.min(2.0 * clear_m);
-                let fails =
-                    section.verdict == Verdict::Open && left_m - confidence_sd * section.hole_sd_m > target_m;
+                let fails = section.verdict == Verdict::Open
+                    && left_m - target.error_m(section.hole_sd_m) > target.max_hole_m;
                 if fails || clear_m >= hole.diameter_m / 2.0 {
                     ask(ask_for(index));
                 } else if may_fail {
@@ -131,12 +131,13 @@ impl Sections {
         let (Some(section), Some(_)) = (self.get(index), not_passed) else { return false };
         let bounds_m = self.bounds_m(index);
         let clear_m = |reach| clear_of(reach, bounds_m.0).max(clear_of(reach, bounds_m.1));
-        let (most_clear_m, half_k) = (clear_m(to_come).min(clear_m(not_passed)), self.confidence_sd / 2.0);
-        if most_clear_m <= self.target_m / 2.0 {
+        let (half_m, half_k) = (self.target.max_hole_m / 2.0, self.target.confidence_sd / 2.0);
+        let most_clear_m = clear_m(to_come).min(clear_m(not_passed));
+        if most_clear_m <= half_m {
             return false;
         }
         let pass_error = self.pass_error(index);
-        let radius_m = |pass_sd_m: f64| self.target_m / 2.0 + half_k * section.visits.sd_m(pass_sd_m);
+        let radius_m = |pass_sd_m: f64| half_m + half_k * section.visits.sd_m(pass_sd_m);
         let needed = Needed {
             radius_m: &|arc_m| radius_m(pass_error.sd_m(profile.point_at(arc_m))),
             most_m: radius_m(pass_error.worst_m(profile)),
@@ -175,12 +176,13 @@ mod tests {
     use headrace_fusion::relative::Relative;
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::Target;
 
     /// Sections that the heads have passed only in part are checked every few centimetres of travel, behind
     /// and ahead.
     #[test]
     fn next_check_is_due_after_a_few_centimetres_of_travel() {
-        let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
+        let mut sections = Sections::new(0.25, Target::new(0.5), -1.0, 10.0);
         for k in 0..100 {
             let x_m = 4.0 + 0.013 * f64::from(k);
             sections.look_again(Some(Reach { from_m: x_m, to_m: x_m }));
@@ -198,7 +200,7 @@ mod tests {
     /// Every other section is judged at each check, because it may have become certain to fail.
     #[test]
     fn stationary_vehicle_judges_sections_with_new_samples() {
-        let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
+        let mut sections = Sections::new(0.25, Target::new(0.5), -1.0, 10.0);
         for (index, flagged, stale) in
             [(8, false, true), (9, false, false), (10, true, true), (11, true, false)]
         {
@@ -231,7 +233,7 @@ mod tests {
     ///
     /// Each request has the section's index, and whether it asks only for a certain fail.
     fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
-        let mut sections = Sections::new(0.25, 0.5, 1.0, 10.0);
+        let mut sections = Sections::new(0.25, Target::new(0.5), 1.0, 10.0);
         set(&mut sections);
         let to_come = Some(Reach { from_m: 3.25, to_m: f64::INFINITY });
         let moved = Moved { left_behind: 10..12, left_ahead: 16..16, way_grown: false, to_come };
@@ -332,7 +334,7 @@ mod tests {
             let (sin, cos) = math::sin_cos(math::TAU / 90.0 * f64::from(k));
             put(10.125 + circle_m * cos, arc_m + circle_m * sin);
         }
-        let mut sections = Sections::new(0.25, 0.5, 0.0, 20.0).with_confidence_sd(3.0);
+        let mut sections = Sections::new(0.25, Target { confidence_sd: 3.0, ..Target::new(0.5) }, 0.0, 20.0);
         let passage = &mut sections.get_mut(40).unwrap().passage;
         let (along, yaw) = (along_m * along_m, yaw_rad * yaw_rad);
         let relative = Relative::new([[along, 0.0, 0.0], [0.0; 3], [0.0, 0.0, yaw]]);

@@ -8,7 +8,7 @@ const SECTION_M: f64 = 0.25;
 
 /// Sections of a stretch from a metre before the portal to 10 m, for a target of 0.5 m.
 fn sections() -> Sections {
-    Sections::new(SECTION_M, 0.5, -1.0, 10.0)
+    Sections::new(SECTION_M, Target::new(0.5), -1.0, 10.0)
 }
 
 #[test]
@@ -75,8 +75,8 @@ fn hole(diameter_m: f64) -> Hole {
 #[test]
 fn section_without_samples_never_passes() {
     let hole = Hole { bounded: false, most_m: f64::INFINITY, ..hole(2.0 * FARTHEST_M) };
-    assert_eq!(verdict(&hole, 0.0, 100.0, BEHIND), Verdict::Fail);
-    assert_eq!(verdict(&hole, 0.0, 100.0, 1.0), Verdict::Open);
+    assert_eq!(verdict(&hole, 0.0, Target::new(100.0), BEHIND), Verdict::Fail);
+    assert_eq!(verdict(&hole, 0.0, Target::new(100.0), 1.0), Verdict::Open);
 }
 
 #[test]
@@ -93,23 +93,28 @@ fn verdict_requires_the_configured_number_of_standard_deviations() {
         (3.0, 1.29, Verdict::CannotSay),
         (3.0, 1.31, Verdict::Fail),
     ] {
-        assert_eq!(verdict(&hole(diameter_m), confidence_sd * 0.1, 1.0, BEHIND), expected, "{diameter_m}");
+        let target = Target { max_hole_m: 1.0, confidence_sd };
+        assert_eq!(verdict(&hole(diameter_m), 0.1, target, BEHIND), expected, "{diameter_m}");
     }
-    assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "a hole as large as the target passes");
+    assert_eq!(
+        verdict(&hole(1.0), 0.0, Target::new(1.0), BEHIND),
+        Verdict::Pass,
+        "a hole as large as the target passes"
+    );
 }
 
 #[test]
 fn verdict_stays_open_until_enough_of_the_hole_is_beyond_the_heads_reach() {
-    let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
+    let at = |clear_m: f64| verdict(&hole(2.0), 0.1, Target::new(1.0), clear_m);
     assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
-    let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);
+    let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, Target::new(1.0), clear_m);
     assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
 }
 
 #[test]
 fn no_verdict_is_given_if_the_hole_bounds_straddle_the_target() {
     let within = |diameter_m: f64, least_m: f64, most_m: f64| {
-        verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, 0.5, BEHIND)
+        verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, Target::new(0.5), BEHIND)
     };
     assert_eq!(within(0.51, 0.49, 0.51), Verdict::CannotSay);
     assert_eq!(within(0.51, 0.501, 0.51), Verdict::Fail);

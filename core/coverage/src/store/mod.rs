@@ -16,6 +16,7 @@ use self::open::{CellAt, OpenBricks};
 use self::packed::{Arena, Lattice, MOST_WORDS, Packed, Reader, Writer};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::head::MAX_HEADS;
 
 /// Number of bricks open at a time.
@@ -198,8 +199,8 @@ impl SampleStore {
     }
 
     /// Whether a point is finite and within the store's extent.
-    pub fn covers(&self, x_m: f64, arc_m: f64) -> bool {
-        self.row(x_m).is_some() && arc_m.is_finite()
+    pub fn covers(&self, at: WallPoint) -> bool {
+        self.row(at.x_m).is_some() && at.arc_m.is_finite()
     }
 
     /// Returns the current contents and memory use.
@@ -273,12 +274,12 @@ impl SampleStore {
         Ok(Kept::Stored)
     }
 
-    /// Calls `take` with chainage, arc length, m, and visit number of all samples between two chainages, m.
+    /// Calls `take` with the place and visit number of all samples between two chainages, m.
     ///
     /// Some samples beyond the two chainages may be included.
     ///
     /// Allocates: never.
-    pub fn each_between(&self, from_m: f64, to_m: f64, mut take: impl FnMut(f64, f64, u32)) {
+    pub fn each_between(&self, from_m: f64, to_m: f64, mut take: impl FnMut(WallPoint, u32)) {
         for number in self.bricks_between(from_m, to_m) {
             let Some(brick) = self.bricks.get(number as usize).filter(|brick| brick.count > 0) else {
                 continue;
@@ -292,14 +293,14 @@ impl SampleStore {
                     for row in in_brick.start.max(first)..in_brick.end.min(last + 1) {
                         for column in 0..self.columns {
                             for node in self.open.in_cell(self.cell_at(slot, row, column)) {
-                                take(node.x_m, node.arc_m, node.visit);
+                                take(WallPoint { x_m: node.x_m, arc_m: node.arc_m }, node.visit);
                             }
                         }
                     }
                 }
                 None => {
                     for (_, sample) in self.packed_samples(number, brick) {
-                        take(sample.x_m, sample.arc_m, sample.visit);
+                        take(WallPoint { x_m: sample.x_m, arc_m: sample.arc_m }, sample.visit);
                     }
                 }
             }

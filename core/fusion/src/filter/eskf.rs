@@ -151,6 +151,19 @@ impl Default for Eskf {
     }
 }
 
+/// Innovation of an update, with the variances that it is weighed by.
+struct Weighed {
+    innovation: f64,
+    /// Variance of the estimate.
+    of_estimate: f64,
+    /// Declared noise.
+    declared: f64,
+    /// Noise of a single reading, as learnt.
+    white: f64,
+    /// Variance from bumps of the wall that many readings see.
+    bumps: f64,
+}
+
 impl Eskf {
     /// Records the steps of each epoch in `steps` from now on, for smoothing. The caller drains them after each
     /// epoch.
@@ -218,35 +231,7 @@ impl Eskf {
         }
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
-            // Each reading is compared with the best estimate so far, because the first readings after a silence
-            // may change the estimate by metres.
-            let known = errors;
-            let later_s = to.since(waiting.at).as_secs_f64();
-            let mut then = self.state_at(waiting.at);
-            then.correct(&state::earlier(&known, later_s));
-            self.suspicions.hear(&then, &context.design(), sources, &waiting);
-            let others_change = sources::others_change(sources, waiting.source);
-            let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
-            if let Reading::TetherLength(length) = waiting.reading {
-                source.count_step.hear(waiting.at, length.length_m, length.resolution_m);
-                if !source.is_due(waiting.at, TETHER_PERIOD) {
-                    continue;
-                }
-            }
-            for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
-                let again = |state: &State| {
-                    rows(state, context, source, &waiting, window).get(number).copied().flatten()
-                };
-                if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
-                    let sd_m = math::sqrt(self.factors.variance_along(&row.h));
-                    if source.says_one_range(&waiting.reading, row.residual, sd_m) && others_change {
-                        source.leave_out(number);
-                        continue;
-                    }
-                    let row = row.seen_later(later_s);
-                    self.fuse(&row, (&waiting, number), &context.settings, source, (&known, &mut errors));
-                }
-            }
+            self.fuse_reading(&waiting, (to, window), context, sources, &mut errors);
         }
         (self.at, self.state) = (to, nominal);
         self.state.correct(&errors);
@@ -260,6 +245,45 @@ impl Eskf {
         let doubts = core::mem::replace(&mut self.doubts, [0.0; ERRORS]);
         if doubts.iter().any(|variance| *variance > 0.0) {
             self.widen(&doubts);
+        }
+    }
+
+    /// Fuses a reading of an epoch that ends at `to`, and adds the corrections to `errors`.
+    fn fuse_reading(
+        &mut self,
+        waiting: &Waiting,
+        (to, window): (MonoNs, &Window),
+        context: &Context,
+        sources: &mut [Option<Source>],
+        errors: &mut Errors,
+    ) {
+        // Each reading is compared with the best estimate so far, because the first readings after a silence
+        // may change the estimate by metres.
+        let known = *errors;
+        let later_s = to.since(waiting.at).as_secs_f64();
+        let mut then = self.state_at(waiting.at);
+        then.correct(&state::earlier(&known, later_s));
+        self.suspicions.hear(&then, &context.design(), sources, waiting);
+        let others_change = sources::others_change(sources, waiting.source);
+        let Some(Some(source)) = sources.get_mut(waiting.source) else { return };
+        if let Reading::TetherLength(length) = waiting.reading {
+            source.count_step.hear(waiting.at, length.length_m, length.resolution_m);
+            if !source.is_due(waiting.at, TETHER_PERIOD) {
+                return;
+            }
+        }
+        for (number, row) in rows(&then, context, source, waiting, window).into_iter().enumerate() {
+            let again =
+                |state: &State| rows(state, context, source, waiting, window).get(number).copied().flatten();
+            if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
+                let sd_m = math::sqrt(self.factors.variance_along(&row.h));
+                if source.says_one_range(&waiting.reading, row.residual, sd_m) && others_change {
+                    source.leave_out(number);
+                    continue;
+                }
+                let row = row.seen_later(later_s);
+                self.fuse(&row, (waiting, number), &context.settings, source, (&known, &mut *errors));
+            }
         }
     }
 
@@ -368,10 +392,7 @@ impl Eskf {
         row.noise += self.left_out(row.bends);
         let (kind, declared) = (source.sensor.kind, row.noise);
         let is_head_square = kind == SensorKind::Head && row.is_square();
-        // Several readings of a cable counter share one rounding error. If this error matters, no noise is learnt
-        // from the innovation.
-        let is_white = !matches!(&waiting.reading, Reading::TetherLength(length)
-            if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m);
+        let is_white = is_white(&waiting.reading, source, settings);
         if settings.learns && is_white {
             row.noise *= source.noise_level.factor(kind, number);
         }
@@ -385,8 +406,7 @@ impl Eskf {
                 row.noise = smooth;
             }
         }
-        let white = row.noise;
-        let bumps = self.bumps(kind, settings);
+        let (white, bumps) = (row.noise, self.bumps(kind, settings));
         row.noise = white + bumps;
         let variance = of_estimate + row.noise;
         let nis = innovation * innovation / variance;
@@ -406,32 +426,57 @@ impl Eskf {
             self.agreement.note(kind, &row, is_near);
         }
         let agrees = believes.unwrap_or(is_near);
-        if agrees {
-            if self.is_blind || !is_white {
-                source.noise_level.skip(number);
-            } else {
-                source.noise_level.note(kind, number, innovation, of_estimate + white);
-            }
-            if kind == SensorKind::VelocityLog {
-                row.noise = declared * VELOCITY_LOOKS;
-            } else if matches!(kind, SensorKind::Echosounder { .. }) {
-                row.noise =
-                    self.spread_over_looks(&row, waiting, [white, bumps, innovation, of_estimate], settings);
-            } else if let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = waiting.reading
-                && settings.learns
-            {
-                let again_m2 = self.seen_again.noise_m2(range_m, white, source.noise_level.share(), settings);
-                row.noise = if self.is_at_rest { again_m2 } else { white };
-            }
-            if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
-                self.correct_by_wall(&row, settings.wall_share, known, errors);
-            } else if matches!(kind, SensorKind::Tether { .. }) {
-                self.correct_by_counter(&row, known, errors);
-            } else {
-                self.correct(&row, known, errors);
-            }
-        } else {
+        if !agrees || self.is_blind || !is_white {
             source.noise_level.skip(number);
+        } else {
+            source.noise_level.note(kind, number, innovation, of_estimate + white);
+        }
+        if agrees {
+            let weighed = Weighed { innovation, of_estimate, declared, white, bumps };
+            row.noise = self.noise_of_correction(&row, waiting, &weighed, source, settings);
+            self.correct_by(kind, &row, settings, known, errors);
+        }
+    }
+
+    /// Returns the noise with which an accepted update corrects the estimate.
+    fn noise_of_correction(
+        &mut self,
+        row: &ScalarUpdate,
+        waiting: &Waiting,
+        weighed: &Weighed,
+        source: &Source,
+        settings: &Settings,
+    ) -> f64 {
+        let Weighed { declared, white, .. } = *weighed;
+        if source.sensor.kind == SensorKind::VelocityLog {
+            declared * VELOCITY_LOOKS
+        } else if matches!(source.sensor.kind, SensorKind::Echosounder { .. }) {
+            self.spread_over_looks(row, waiting, weighed, settings)
+        } else if let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = waiting.reading
+            && settings.learns
+        {
+            let again_m2 = self.seen_again.noise_m2(range_m, white, source.noise_level.share(), settings);
+            if self.is_at_rest { again_m2 } else { white }
+        } else {
+            row.noise
+        }
+    }
+
+    /// Corrects the estimate by an update from a sensor of this kind.
+    fn correct_by(
+        &mut self,
+        kind: SensorKind,
+        row: &ScalarUpdate,
+        settings: &Settings,
+        known: &Errors,
+        errors: &mut Errors,
+    ) {
+        match kind {
+            SensorKind::Head | SensorKind::Echosounder { .. } => {
+                self.correct_by_wall(row, settings.wall_share, known, errors);
+            }
+            SensorKind::Tether { .. } => self.correct_by_counter(row, known, errors),
+            _ => self.correct(row, known, errors),
         }
     }
 
@@ -450,12 +495,13 @@ impl Eskf {
         &mut self,
         row: &ScalarUpdate,
         waiting: &Waiting,
-        [white_m2, bumps_m2, innovation_m, of_estimate_m2]: [f64; 4],
+        weighed: &Weighed,
         settings: &Settings,
     ) -> f64 {
+        let Weighed { innovation, of_estimate, white, bumps, .. } = *weighed;
         let speed_mps = self.state.velocity_mps.norm();
         let looks = self.roughness.looks_at_a_bump(waiting.source, waiting.at, speed_mps, settings.bump_m);
-        let noise_m2 = white_m2 + bumps_m2 * looks;
+        let noise_m2 = white + bumps * looks;
         let mut of_scale = [0.0; ERRORS];
         if let (Some(slot), Some(by)) = (of_scale.get_mut(RANGES), row.h.get(RANGES)) {
             *slot = 2.0 * by;
@@ -464,8 +510,8 @@ impl Eskf {
             source: waiting.source,
             at: waiting.at,
             by_place: state::vec(&row.h, POSITION),
-            left_m: innovation_m * noise_m2 / (of_estimate_m2 + noise_m2),
-            white_m2,
+            left_m: innovation * noise_m2 / (of_estimate + noise_m2),
+            white_m2: white,
         };
         self.roughness.note(look, 1.0 / looks, self.factors.variance_along(&of_scale), settings);
         noise_m2
@@ -668,4 +714,13 @@ impl Eskf {
         }
         false
     }
+}
+
+/// Whether the noise of a reading is independent of that of other readings.
+///
+/// Several readings share the rounding error of a counter. If this error matters, no noise is learnt from the
+/// innovation.
+fn is_white(reading: &Reading, source: &Source, settings: &Settings) -> bool {
+    !matches!(reading, Reading::TetherLength(length)
+        if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m)
 }

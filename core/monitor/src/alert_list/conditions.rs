@@ -142,7 +142,7 @@ impl AlertList {
         self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
         let is_spread = state.position == PositionState::Doubtful(PositionDoubt::Spread)
             && (self.had.sure_position || is_late);
-        let error = Figures::Error(state.confidence_sd * state.pass_sd_m, state.stand_s > 0);
+        let error = Figures::Error(state.target.error_m(state.pass_sd_m), state.stand_s > 0);
         self.observe(at, &Seen::of(ListKind::PositionDoubtful, is_spread, error), to);
     }
 

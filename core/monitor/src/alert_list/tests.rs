@@ -318,15 +318,16 @@ fn later_occurrences_update_the_alert_figures_and_publish_no_notice() {
 fn contradiction_found_at_the_end_of_a_dive_raises_one_alert() {
     let mut bench = Bench::new(1.0, 5.0);
     let (mut observations, at) = (Observations::default(), MonoNs(9));
-    observations.note(ObservedKind::ProfileContradicted, at, 7.0, 0.4);
-    observations.note_of(Some(SourceId(1)), ObservedKind::HeadConstant, at, 7.0, 0.4);
+    let first = Occurrence { x_m: 7.0, off_m: 0.4 };
+    observations.note(ObservedKind::ProfileContradicted, at, first);
+    observations.note_of(Some(SourceId(1)), ObservedKind::HeadConstant, at, first);
     for (count, worst_m) in [(1, 0.4), (2, 0.5)] {
         bench.with(|list, to| list.take_observations_at_end(&observations, at, to));
         let alerts: Vec<_> =
             bench.list.iter().map(|alert| (alert.kind, alert.since, alert.figures)).collect();
         let figures = Figures::Deviation(Occurrences { count, first_m: 7.0, worst_m });
         assert_eq!(alerts, [(ListKind::ProfileContradicted, at, figures)]);
-        observations.note(ObservedKind::ProfileContradicted, at, 8.0, 0.5);
+        observations.note(ObservedKind::ProfileContradicted, at, Occurrence { x_m: 8.0, off_m: 0.5 });
     }
     assert_eq!(bench.notices.len(), 1);
 }

@@ -1,7 +1,7 @@
 //! Texts of alerts, from the same table of words as the pilot's other messages. Allocates: outlets only,
 //! never within a tick.
 
-use super::{AlertState, Figures, ListKind, ListedAlert, Occurrences};
+use super::{AlertState, Figures, ListKind, ListedAlert, Occurrence, Occurrences};
 use crate::head_descriptions::HeadDescriptions;
 use crate::pilot_text::{
     actions_text, advice_text, cause_text, clock_text, no_position_text, observation_text, setting_text,
@@ -21,10 +21,6 @@ pub struct TextContext<'a> {
     pub profile: &'a Profile,
     /// Length of a tunnel section, m.
     pub section_m: f64,
-    /// Coverage target T, m.
-    pub target_m: f64,
-    /// Confidence: number of standard deviations by which a hole's size must clear the target for a verdict.
-    pub confidence_sd: f64,
     /// Sections of the tunnel, from which the place to go back to is found.
     pub sections: &'a Sections,
     /// Names of the heads, and the alternative settings that could be advised.
@@ -39,19 +35,11 @@ impl<'a> TextContext<'a> {
         sections: &'a Sections,
         heads: &'a HeadDescriptions,
     ) -> Self {
-        Self {
-            sources,
-            profile,
-            section_m: sections.section_m(),
-            target_m: sections.target_m(),
-            confidence_sd: sections.confidence_sd(),
-            sections,
-            heads,
-        }
+        Self { sources, profile, section_m: sections.section_m(), sections, heads }
     }
 
     fn unsure(&self, stretch: &Stretch) -> UnsureStretch {
-        UnsureStretch::from_sections(stretch, self.section_m, self.confidence_sd)
+        UnsureStretch::of(stretch, self.sections)
     }
 
     fn name(&self, source: usize) -> String {
@@ -97,7 +85,10 @@ impl ListedAlert {
             (_, Figures::MissingRequirement(lacking)) => no_position_text(*lacking),
             (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
             (kind, Figures::Deviation(Occurrences { first_m, worst_m, .. })) => match kind.observed() {
-                Some(kind) => place_first(&observation_text(kind, &name, *first_m, *worst_m), *first_m),
+                Some(kind) => {
+                    let worst = Occurrence { x_m: *first_m, off_m: *worst_m };
+                    place_first(&observation_text(kind, &name, worst), *first_m)
+                }
                 None => String::new(),
             },
             (_, Figures::Setting(doubt, Occurrences { first_m, .. })) => {

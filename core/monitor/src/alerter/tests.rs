@@ -10,6 +10,7 @@ use headrace_fusion::relative::Relative;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::tunnel::shapes;
+use headrace_sampling::Target;
 use headrace_sensor::reading::Reading;
 use headrace_vehicle::{AlertTiming, LimitsConfig};
 
@@ -40,7 +41,7 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
     let entry = AdviceEntry { at: AT, chainage_m: None, speed_mps: 0.07, advice: advice(&situation) };
     let advised = Advised { entries: vec![entry], ..Advised::default() };
     let list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100);
-    let mut alerter = Alerter::new(list, &LiveState::new(0.5, 2.0, 0, 0), Vec::new(), 0, false);
+    let mut alerter = Alerter::new(list, &LiveState::new(Target::new(0.5), 0, 0), Vec::new(), 0, false);
     alerter.tick(&placed, &found, &advised, MonoNs(9_050_000_000));
     alerter.state
 }
@@ -75,7 +76,7 @@ fn run(event: usize, at_beat: bool) -> RunInput {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();
     let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 100 };
-    let mut sections = Sections::new(0.25, 0.5, 0.0, 20.0);
+    let mut sections = Sections::new(0.25, Target::new(0.5), 0.0, 20.0);
     let mut told: Option<(RunId, RunChange)> = None;
     let request = Request {
         section: 4,
@@ -118,7 +119,7 @@ impl Bench {
         let command = Command::Acknowledge { alert: 0, by: crate::console::Who::default() };
         let list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100);
         Self {
-            alerter: Alerter::new(list, &LiveState::new(0.5, 2.0, 0, 3), Vec::new(), 1, false),
+            alerter: Alerter::new(list, &LiveState::new(Target::new(0.5), 0, 3), Vec::new(), 1, false),
             run,
             command: ReceivedCommand { before: command_before, at: NOW, command },
             events: (0..10).map(event).collect(),

@@ -144,7 +144,7 @@ impl LiveState {
             _ if share > TOO_FAST => Condition::TooFast,
             // `will_exceed` stays set for a second, although the forecast for the present turn may be within
             // the target again.
-            _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => {
+            _ if advice.will_exceed && self.turn_exceeds(self.target.max_hole_m) && share <= OVER => {
                 Condition::TurnFails
             }
             PositionState::Doubtful(doubt) => Condition::CannotSay(doubt),

@@ -181,12 +181,12 @@ impl LiveState {
             reason: advice.map(|advice| advice.reason.as_str()),
             margins: MarginsJson {
                 speed_mps: less(self.v_max_mps(), self.speed_mps.map(f64::abs)),
-                turn_m: less(Some(self.target_m), predicted_m),
-                position_m: pass_sd_m.map(|sd_m| self.confidence_sd * sd_m),
+                turn_m: less(Some(self.target.max_hole_m), predicted_m),
+                position_m: pass_sd_m.map(|sd_m| self.target.error_m(sd_m)),
                 lost_share: self.lost_share(),
             },
             turn: advice.map(|advice| TurnJson {
-                target_m: self.target_m,
+                target_m: self.target.max_hole_m,
                 predicted_t_m: predicted_m,
                 will_exceed: advice.will_exceed,
                 t_y_m: advice.t_y_m,

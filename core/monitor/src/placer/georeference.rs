@@ -7,13 +7,14 @@ use super::decode::Events;
 use super::navigate::{Positioned, PositionedList};
 use crate::entities::{Head, HiddenAngles, LossCount, MeasuredMotion, Mounted};
 use crate::head_health::Heard;
-use crate::messages::{Aim, Event, Hidden, Outcome, PlacedItem, PlacedPing, Placement, Update};
-use crate::resources::{Target, TunnelDesign};
+use crate::messages::{Event, Hidden, Outcome, PlacedItem, PlacedPing, Placement, Update};
+use crate::resources::{Plan, TunnelDesign};
 use headrace_coverage::deviation::off_m;
 use headrace_coverage::{Loss, PassError};
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Mount, head_direction};
 use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS, SILENT_AFTER};
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
@@ -37,7 +38,7 @@ pub(super) fn georeference(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,
     tunnel: Res<'_, TunnelDesign>,
-    target: Res<'_, Target>,
+    plan: Res<'_, Plan>,
     mut heads: Heads<'_, '_>,
     mut placed: ResMut<'_, PlacedList>,
 ) {
@@ -45,7 +46,7 @@ pub(super) fn georeference(
     for item in &positioned.0 {
         match *item {
             Positioned::Beat { at, fix, doubts, sd, before } => {
-                let situation = situation(at, fix, &tunnel, &target, &heads);
+                let situation = situation(at, fix, &tunnel, &plan, &heads);
                 let placement = Placement::Update(Update { at, situation, doubts, fix, sd });
                 placed.0.push(PlacedItem { event: before, placement });
             }
@@ -153,7 +154,7 @@ fn outcome(
         return sample(range_m);
     }
     let wall = tunnel.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
-    let aim = wall.map(|wall| Aim { x_m: origin.x() + wall.range_m * beam.x(), arc_m: wall.arc_m });
+    let aim = wall.map(|wall| WallPoint { x_m: origin.x() + wall.range_m * beam.x(), arc_m: wall.arc_m });
     let wall_m = wall.map(|wall| wall.range_m);
     if let Some(range_m) = range_m.filter(|range_m| wall_m.is_none_or(|wall| *range_m > VEHICLE_SHARE * wall))
     {
@@ -178,7 +179,7 @@ fn situation(
     at: MonoNs,
     fix: Result<Fix, NoFix>,
     tunnel: &TunnelDesign,
-    target: &Target,
+    plan: &Plan,
     heads: &Heads<'_, '_>,
 ) -> Situation {
     let mut motions = [None; MAX_HEADS];
@@ -212,7 +213,7 @@ fn situation(
         pose: fix.ok().map(|fix| fix.pose),
         speed_mps: fix.map_or(0.0, |fix| fix.speed_mps),
         pass_error_m: fix.map_or(0.0, |fix| PassError::of(&fix).worst_m(&tunnel.profile)),
-        layout: target.layout,
+        layout: plan.layout,
         configured: heads.iter().len(),
         heads: motions,
         deaf,
@@ -233,6 +234,7 @@ mod tests {
     use headrace_geometry::site::Site;
     use headrace_geometry::time::DurNs;
     use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::Target;
     use headrace_sampling::layout::HeadLayout;
     use headrace_sensor::device::{SensorInfo, SensorKind};
     use headrace_sensor::reading::SourceId;
@@ -296,10 +298,10 @@ mod tests {
         }
         let (tunnel, other) = (tunnel(), OtherSettings::default());
         let layout = HeadLayout::PhaseShift;
-        let target = Target { target_m: 0.5, layout, planned_speed_mps: 0.0, other };
+        let plan = Plan { target: Target::new(0.5), layout, planned_speed_mps: 0.0, other };
         let mut state = SystemState::<Heads<'_, '_>>::new(&mut world);
         let query = state.get_mut(&mut world).unwrap();
-        let found = situation(at(10.53), Err(NoFix::Heading), &tunnel, &target, &query);
+        let found = situation(at(10.53), Err(NoFix::Heading), &tunnel, &plan, &query);
         for (motion, (from_s, rate_radps)) in found.heads.iter().zip(heads).take(2) {
             let motion = motion.unwrap();
             let off_rad = motion.angle_rad - 1.0 - rate_radps * (10.53 - from_s);

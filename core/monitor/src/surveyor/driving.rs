@@ -4,7 +4,8 @@
 use bevy_ecs::prelude::Resource;
 
 use super::missing_samples::MissingSampleFinder;
-use headrace_coverage::{Drive, OtherSettings};
+use crate::resources::Plan;
+use headrace_coverage::Drive;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
@@ -37,19 +38,6 @@ const IN_STEP: f64 = 1.05;
 const WAITS: usize = 4;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
-
-/// Target and settings by which the driving of a dive is judged.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Plan {
-    /// Speed for which the heads are set in phase, m/s; zero if none is planned.
-    pub(super) planned_mps: f64,
-    /// Coverage target T, m.
-    pub(super) target_m: f64,
-    /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
-    pub(super) confidence_sd: f64,
-    /// Predicted effect of alternative head settings.
-    pub(super) other: OtherSettings,
-}
 
 /// Driving figures at the last update, and the data kept to compute the next ones.
 #[derive(Debug, Clone, Default, Resource)]
@@ -91,11 +79,11 @@ impl Driving {
             self.now.swing_m = 0.0;
             return;
         };
-        self.note_gaps(at, [situation, healthy], plan.planned_mps);
+        self.note_gaps(at, [situation, healthy], plan.planned_speed_mps);
         self.now.other = plan.other;
         self.note_fit(healthy, plan);
         let t_y_m = self.now.middle_t_y_m;
-        let sampled = Sampled { target_m: plan.target_m, t_y_m, perimeter_m: profile.perimeter_m() };
+        let sampled = Sampled { target_m: plan.target.max_hole_m, t_y_m, perimeter_m: profile.perimeter_m() };
         self.now.passes_needed = sampled.passes_needed(situation.losses_of_turning());
         self.now.lost = situation.lost_at_most;
         let place_m = [pose.position.y(), pose.position.z()];
@@ -113,9 +101,8 @@ impl Driving {
     /// changed.
     fn note_fit(&mut self, healthy: &Situation, plan: &Plan) {
         let now = &mut self.now;
-        let Plan { target_m, confidence_sd, .. } = *plan;
-        let sure_m =
-            target_m - position_margin_m(target_m, confidence_sd, healthy.pass_error_m, now.middle_t_y_m);
+        let margin_m = position_margin_m(plan.target, healthy.pass_error_m, now.middle_t_y_m);
+        let sure_m = plan.target.max_hole_m - margin_m;
         let passes = [now.all_gap_s, now.middle_t_y_m, sure_m];
         if passes.iter().zip(self.fitted).all(|(now, then)| (now - then).abs() <= SAME_PASSES * now.abs()) {
             return;
@@ -248,8 +235,10 @@ fn apart_m(situation: &Situation) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use headrace_coverage::OtherSettings;
     use headrace_geometry::frames::{Mount, Point3, Pose, Rot};
     use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::Target;
     use headrace_sampling::head::MAX_HEADS;
     use headrace_sampling::losses::LossRate;
 
@@ -282,11 +271,16 @@ mod tests {
         }
     }
 
+    fn plan(planned_speed_mps: f64) -> Plan {
+        let (target, layout) = (Target::new(0.5), HeadLayout::PhaseShift);
+        Plan { target, layout, planned_speed_mps, other: OtherSettings::default() }
+    }
+
     const EVEN: [f64; 4] = [0.0, 90.0, 180.0, 270.0];
 
     fn noted(driving: &mut Driving, angles_deg: [f64; 4], speed_mps: f64, planned_mps: f64) -> Drive {
         let profile = shapes::circle(3.0).unwrap();
-        let plan = Plan { planned_mps, target_m: 0.5, confidence_sd: 2.0, other: OtherSettings::default() };
+        let plan = plan(planned_mps);
         let situation = situation(angles_deg, speed_mps, &profile);
         driving.note(MonoNs(60_000_000_000), [&situation, &situation], &profile, &plan);
         driving.now
@@ -314,8 +308,7 @@ mod tests {
     #[test]
     fn time_between_passes_is_kept_while_all_heads_are_stalled() {
         let profile = shapes::circle(3.0).unwrap();
-        let plan =
-            Plan { planned_mps: 0.2, target_m: 0.5, confidence_sd: 2.0, other: OtherSettings::default() };
+        let plan = plan(0.2);
         let mut driving = Driving::default();
         let before = noted(&mut driving, EVEN, 0.2, 0.2);
         let healthy = situation(EVEN, 0.2, &profile);

@@ -5,7 +5,7 @@ use bevy_ecs::prelude::{Res, ResMut};
 use super::survey::{Cursor, OutputRefs, Outputs, Requests};
 use crate::alert_list::RunInput;
 use crate::messages::Notice;
-use crate::observations::ObservedKind;
+use crate::observations::{ObservedKind, Occurrence};
 use crate::resources::{Coverage, Digests, Finder, TunnelDesign};
 use crate::result_stream::RecordKind;
 use crate::section_judgement;
@@ -59,10 +59,10 @@ fn judge_one(
     section_judgement::record(&mut digests.judgements, request.at, request.section, change, section);
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);
-        let x_m = sections.bounds_m(request.section).0;
+        let occurrence = Occurrence { x_m: sections.bounds_m(request.section).0, off_m };
         let kind = ObservedKind::ProfileContradicted;
-        if observations.note(kind, request.at, x_m, off_m) {
-            digest_observation(digests, kind, None, request.at, (x_m, off_m));
+        if observations.note(kind, request.at, occurrence) {
+            digest_observation(digests, kind, None, request.at, occurrence);
         }
     }
 }
@@ -82,16 +82,16 @@ fn note_runs(notices: &[Notice], stop: (usize, bool), sections: &Sections, runs:
     }
 }
 
-/// Adds an observation to the digest: its chainage, its deviation, m, and its source if it names one.
+/// Adds an observation to the digest, with its source if it names one.
 pub(super) fn digest_observation(
     digests: &mut Digests,
     kind: ObservedKind,
     source: Option<SourceId>,
     at: MonoNs,
-    at_off_m: (f64, f64),
+    occurrence: Occurrence,
 ) {
     let record = digests.judgements.record(RecordKind::Alert).integer(at.0).integer(kind as u64);
-    record.number(at_off_m.0).number(at_off_m.1);
+    record.number(occurrence.x_m).number(occurrence.off_m);
     if let Some(source) = source {
         record.integer(u64::from(source.0));
     }

@@ -8,14 +8,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::heads::Heads;
-use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
+use crate::messages::{Hidden, Outcome, PlacedPing};
 use crate::resources::Coverage;
 use headrace_coverage::{Cause, Causes, Drive, Loss, MissingSample, MissingSamples};
 use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_geometry::tunnel::Profile;
+use headrace_geometry::tunnel::{Profile, WallPoint};
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS};
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
@@ -171,7 +171,7 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
     head.moved = Some(ping.valid_at);
     match ping.outcome {
         Outcome::Sample { .. } => head.note_hidden(ping.hidden == Hidden::Yes, false),
-        Outcome::Lost(loss, Some(Aim { x_m, arc_m })) => {
+        Outcome::Lost(loss, Some(WallPoint { x_m, arc_m })) => {
             head.note_hidden(loss == Loss::Occluded, true);
             // If other pings at angles assumed to be occluded detect the wall, a lost ping there is a missing
             // return.

@@ -21,7 +21,7 @@ pub(super) fn note_passage(
     let Some(reach) = ping.reach.or_else(|| Some(frontier.0?.latest())) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
     let turns = coverage.frontier.turns();
-    let target_m = coverage.sections.target_m();
+    let target_m = coverage.sections.target().max_hole_m;
     let Some(section) = coverage.sections.get_mut(index) else { return };
     let passage = &mut section.passage;
     passage.pings += 1;

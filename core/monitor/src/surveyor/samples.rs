@@ -7,6 +7,7 @@ use headrace_coverage::hole::FARTHEST_M;
 use headrace_coverage::{StoreError, Visit, WallSample};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
 /// Stores a sample, and adds its spacings to its section.
@@ -26,13 +27,14 @@ pub(super) fn note_sample(
         }
         return Ok(());
     };
-    if !coverage.store.covers(point.x(), arc_m) {
+    let at = WallPoint { x_m: point.x(), arc_m };
+    if !coverage.store.covers(at) {
         *slot = None;
         return Err(StoreError::Outside);
     }
     let before = *slot;
     let step_from = before.filter(|last| last.unbroken && ping.single_step);
-    let t_x_m = coverage.store.nearest_pass_m(point.x(), arc_m, FARTHEST_M);
+    let t_x_m = coverage.store.nearest_pass_m(at, FARTHEST_M);
     let perimeter_m = coverage.store.perimeter_m();
     let step_m = step_from
         .map(|last| [point.x() - last.point.x(), math::wrap_signed(arc_m - last.arc_m, perimeter_m)]);
@@ -43,7 +45,7 @@ pub(super) fn note_sample(
     let kept = coverage.store.insert(sample);
     *slot = kept.ok().map(|_| LastSample { point, arc_m, unbroken: true });
     kept?;
-    coverage.soundings.add(point.x(), arc_m);
+    coverage.soundings.add(at);
     if let Some(visit) = visit {
         coverage.sections.touch(point.x(), &visit, &tunnel.profile);
     }
@@ -89,7 +91,7 @@ mod tests {
             // Centres of the steps. A pass is a single step that crosses an arc length.
             let passes = [0.5, 1.5, 2.5, 3.5].map(|middle| {
                 let Outcome::Sample { arc_m, .. } = heard(5.1, 0.1 * middle, 3.0).outcome else { panic!() };
-                coverage.store.nearest_pass_m(5.1, arc_m, 1.0).is_some()
+                coverage.store.nearest_pass_m(WallPoint { x_m: 5.1, arc_m }, 1.0).is_some()
             });
             (samples, steps, t_y_m, passes)
         };

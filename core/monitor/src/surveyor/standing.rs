@@ -93,7 +93,7 @@ fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) 
     let reaches = heads.iter().map(|(.., frontier)| frontier.0.map(|reach| reach.latest()));
     let all = reaches.reduce(|all, reach| Some(all?.with(reach?))).flatten();
     let Some(all) = all.filter(|_| situation.pose.is_some()) else { return false };
-    let (ahead_m, around_m) = (SOON_S * situation.speed_mps, sections.target_m() / 2.0);
+    let (ahead_m, around_m) = (SOON_S * situation.speed_mps, sections.target().max_hole_m / 2.0);
     let from_m = all.from_m.min(all.from_m + ahead_m) - around_m;
     let to_m = all.to_m.max(all.to_m + ahead_m) + around_m;
     let mut indices = sections.index_of(from_m)..=sections.index_of(to_m);
@@ -114,6 +114,7 @@ fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::fixtures::{coverage, mount, pipe, situation};
+    use crate::observations::Occurrence;
     use bevy_ecs::system::SystemState;
     use bevy_ecs::world::World;
     use headrace_coverage::{HeadReach, HoleFinder, Judging, MissingSamples, Reach, Request};
@@ -203,7 +204,7 @@ mod tests {
         let kinds = [ObservedKind::HeadScattered, ObservedKind::HeadConstant, ObservedKind::HeadOutvoted];
         let (mut observations, at) = (Observations::default(), MonoNs(5));
         for (source, kind) in (0..3).flat_map(|source| kinds.map(|kind| (SourceId(source), kind))) {
-            observations.note_of(Some(source), kind, at, 1.0, 0.5);
+            observations.note_of(Some(source), kind, at, Occurrence { x_m: 1.0, off_m: 0.5 });
         }
         let doubts = Doubts { cable: None, setting: None, stand_s: 0, hung: 0 };
         for (head, kind) in (0..3).zip(kinds) {

@@ -8,7 +8,7 @@ use crate::alert_list::RunInput;
 use crate::merge::MAX_TICK_PACKETS;
 use crate::messages::{Notice, Standing};
 use crate::observations::Observations;
-use crate::resources::{Coverage, Digests, Tally, Target};
+use crate::resources::{Coverage, Digests, Plan, Tally};
 use headrace_coverage::Request;
 
 /// Maximum number of runs of flagged sections that change when one section is judged: its own run and two
@@ -69,7 +69,7 @@ pub(super) struct Survey<'w> {
     pub(super) requests: ResMut<'w, Requests>,
     pub(super) tally: ResMut<'w, Tally>,
     pub(super) cursor: ResMut<'w, Cursor>,
-    pub(super) target: Res<'w, Target>,
+    pub(super) plan: Res<'w, Plan>,
 }
 
 /// Destinations of the surveyor's results.

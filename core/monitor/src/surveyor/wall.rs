@@ -10,12 +10,13 @@ use super::missing_samples::number_of;
 use super::samples::note_sample;
 use super::survey::{OutputRefs, Outputs};
 use crate::entities::{HeadClassifier, HeadEntities, HeadSweep, Waiting};
-use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
-use crate::observations::ObservedKind;
+use crate::messages::{Hidden, Outcome, PlacedPing};
+use crate::observations::{ObservedKind, Occurrence};
 use crate::resources::{Coverage, Digests, Tally, TunnelDesign};
 use crate::result_stream::RecordKind;
 use headrace_coverage::{Cause, Causes, Loss, MissingSample, StoreError, Taken};
 use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::tunnel::WallPoint;
 
 /// Distance beyond either end of the tunnel from which samples are recorded as outside, m.
 const WELL_BEYOND_M: f64 = 1.0;
@@ -58,11 +59,11 @@ pub(super) fn note_ping(
         Taken::Waits | Taken::Doubtful => doubtful(context, sweep, ping, *is_distrusted),
     }
     let (why, between_m) = sorted.distrusted?;
-    let (kind, figure_m) = ObservedKind::of_distrust(why);
-    let source = Some(ping.source);
+    let (kind, off_m) = ObservedKind::of_distrust(why);
+    let (source, occurrence) = (Some(ping.source), Occurrence { x_m: point.x(), off_m });
     let OutputRefs { digests, observations, .. } = &mut context.outputs;
-    if observations.note_of(source, kind, ping.received, point.x(), figure_m) {
-        digest_observation(digests, kind, source, ping.received, (point.x(), figure_m));
+    if observations.note_of(source, kind, ping.received, occurrence) {
+        digest_observation(digests, kind, source, ping.received, occurrence);
     }
     Some(between_m)
 }
@@ -122,10 +123,10 @@ fn wall(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     digest(context.outputs.digests, ping, RecordKind::Sample);
     let OutputRefs { digests, observations, .. } = &mut context.outputs;
     let kind = ObservedKind::OutsideTunnel;
-    if let Some(beyond_m) = beyond_end_m(ping, context.tunnel.length_m)
-        && observations.note(kind, ping.received, beyond_m.0, beyond_m.1)
+    if let Some(occurrence) = beyond_end(ping, context.tunnel.length_m)
+        && observations.note(kind, ping.received, occurrence)
     {
-        digest_observation(digests, kind, None, ping.received, beyond_m);
+        digest_observation(digests, kind, None, ping.received, occurrence);
     }
     store(context, sweep, ping);
 }
@@ -161,7 +162,7 @@ fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedP
             section.passage.silent = section.passage.silent.with(ping.head);
         }
     }
-    let Some(Aim { x_m, arc_m }) = aim else { return };
+    let Some(WallPoint { x_m, arc_m }) = aim else { return };
     // A doubtful echo at an angle just beside the vehicle's outline comes from the vehicle.
     let cause = match ping.hidden {
         Hidden::No if is_distrusted => Cause::HeadSilent,
@@ -175,22 +176,22 @@ fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedP
 }
 
 /// Point at which a beam would have met the design profile.
-fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -> Option<Aim> {
+fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -> Option<WallPoint> {
     let beam = *point - *origin;
     let length_m = Some(beam.norm()).filter(|length_m| *length_m > 0.0)?;
     let across = [beam.y() / length_m, beam.z() / length_m];
     let wall = tunnel.profile.cast([origin.y(), origin.z()], across)?;
-    Some(Aim { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
+    Some(WallPoint { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
 }
 
-/// Chainage of a sample well beyond either end of the tunnel, and the sample's distance from that end, m.
+/// A sample well beyond either end of the tunnel, with the sample's distance from that end.
 ///
 /// A vehicle that turns at an end has heads slightly beyond the end, which is normal.
-fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
+fn beyond_end(ping: &PlacedPing, length_m: f64) -> Option<Occurrence> {
     let Outcome::Sample { point, .. } = ping.outcome else { return None };
     let x_m = point.x();
-    let beyond_m = (-x_m).max(x_m - length_m);
-    (beyond_m > WELL_BEYOND_M).then_some((x_m, beyond_m))
+    let off_m = (-x_m).max(x_m - length_m);
+    (off_m > WELL_BEYOND_M).then_some(Occurrence { x_m, off_m })
 }
 
 fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
@@ -307,7 +308,7 @@ mod tests {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
                 panic!()
             };
-            bench.coverage.store.clone().nearest_pass_m(5.1, arc_m, 0.5).is_some()
+            bench.coverage.store.clone().nearest_pass_m(WallPoint { x_m: 5.1, arc_m }, 0.5).is_some()
         };
         assert!((1..18).all(|number| crossed(f64::from(number) + 0.5)));
     }
@@ -339,7 +340,8 @@ mod tests {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + 2.5 * STEP_RAD, 2.4).outcome else {
                 panic!()
             };
-            let is_crossed = bench.coverage.store.nearest_pass_m(5.1, arc_m, 0.5).is_some();
+            let is_crossed =
+                bench.coverage.store.nearest_pass_m(WallPoint { x_m: 5.1, arc_m }, 0.5).is_some();
             (is_crossed, bench.coverage.sections.get(20).unwrap().t_y_m.count)
         };
         let lost = pinged(5.1, 1.0 + 2.0 * STEP_RAD);

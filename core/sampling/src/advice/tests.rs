@@ -65,8 +65,7 @@ impl Case {
     fn advisor(&self) -> Advisor {
         let heads: Vec<_> = self.specs.iter().map(|spec| (*spec, modes())).collect();
         let task = Task {
-            target_m: self.target_m,
-            confidence_sd: 2.0,
+            target: Target::new(self.target_m),
             length_m: LENGTH_M,
             layout: self.situation.layout,
             sound_speed_mps: 1500.0,

@@ -23,8 +23,7 @@ impl Planner {
         let inspection = self.inspection();
         let specs = self.specs(mode);
         let task = Task {
-            target_m,
-            confidence_sd: self.errors.as_ref().map_or(0.0, |errors| errors.confidence_sd),
+            target: self.target(target_m),
             length_m: inspection.length_m,
             layout: inspection.layout,
             sound_speed_mps: inspection.sound_speed_mps,

@@ -158,7 +158,7 @@ impl Dives {
 
     fn oracle_m(&self) -> Result<f64, CostError> {
         let Some((scene, recorded)) = self.0.first() else { return Ok(0.0) };
-        let end_m = END_M + scene.vehicle.target_m;
+        let end_m = END_M + scene.vehicle.target.max_hole_m;
         let [from_m, to_m] = recorded.truth.way_m;
         let off_m = second::may_be_off_m(
             &recorded.truth,

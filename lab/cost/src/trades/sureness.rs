@@ -144,7 +144,7 @@ fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Err
     let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
     let dives = side_by_side(&seeds, |seed| {
         let mut scene = inputs.scene(&text, *seed)?;
-        scene.vehicle.coverage.confidence_sd = f64::from(confidence);
+        scene.vehicle.target.confidence_sd = f64::from(confidence);
         let dive = Recorded::of(&scene, &scene.vehicle)?.judged(&scene.vehicle)?;
         Ok(inner(&dive).map(Judged::of).collect::<Vec<_>>())
     })?;

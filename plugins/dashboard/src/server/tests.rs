@@ -5,6 +5,7 @@ use std::net::{Ipv4Addr, TcpStream};
 use std::sync::atomic::AtomicU32;
 
 use headrace_geometry::tunnel::shapes::circle;
+use headrace_sampling::Target;
 use tokio::time::Instant;
 
 use super::*;
@@ -35,10 +36,9 @@ fn served(proxies: &[IpAddr]) -> Served {
         mode: Mode::Live,
         dive: "dive".to_owned(),
         vehicle: "vehicle".to_owned(),
-        target_m: 0.5,
+        target: Target::new(0.5),
         compared_m: None,
         section_m: 0.25,
-        confidence_sd: 2.0,
         length_m: 100.0,
         profile: circle(2.0).unwrap(),
         heads: Vec::new(),

@@ -32,6 +32,8 @@ mod tests;
 use headrace_fusion::NoFix;
 use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::WallPoint;
+use headrace_monitor::alert_list::Occurrence;
 use headrace_monitor::pilot_text::{AdviceFigures, advice_text, recorded_observation_text};
 use headrace_monitor::result_stream::{Record, RecordKind, first_record, text_of};
 use headrace_monitor::section_judgement::SectionJudgement;
@@ -199,7 +201,7 @@ impl View {
         let [x_m, y_m, z_m, arc_m] = words.numbers()?;
         let head = self.site.heads.iter().position(|head| *head == source);
         let head = head.and_then(|head| u8::try_from(head).ok()).unwrap_or(u8::MAX);
-        self.wall.sample(x_m, arc_m);
+        self.wall.sample(WallPoint { x_m, arc_m });
         made.push_some(Topic::Points, self.points.add(at, head, [x_m, y_m, z_m]).as_ref());
         Some(())
     }
@@ -270,7 +272,7 @@ impl View {
         let [x_m, off_m] = words.numbers()?;
         let head = words.integer().and_then(|source| self.site.heads.iter().position(|head| *head == source));
         let head = head.map_or_else(String::new, |head| format!("head {}", head + 1));
-        let text = recorded_observation_text(kind, &head, x_m, off_m)?;
+        let text = recorded_observation_text(kind, &head, Occurrence { x_m, off_m })?;
         made.push(Topic::Alerts, &Log::new(at, Level::Error, text));
         Some(())
     }

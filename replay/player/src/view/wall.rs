@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::WallPoint;
 
 use super::messages::{Field, Grid, Pose, Turn, Xy, Xyz, base64, rounded};
 use super::site::{Site, WALL};
@@ -63,7 +64,7 @@ impl Wall {
     }
 
     /// Counts a sample in its grid cell of the wall.
-    pub(super) fn sample(&mut self, x_m: f64, arc_m: f64) {
+    pub(super) fn sample(&mut self, WallPoint { x_m, arc_m }: WallPoint) {
         let row = usize::try_from(math::floor_to_i64(arc_m / self.cell_m)).unwrap_or(0).min(self.cells - 1);
         let column = self.column(math::floor_to_i64(x_m / self.section_m));
         if let Some(count) = column.and_then(|column| column.samples.get_mut(row))

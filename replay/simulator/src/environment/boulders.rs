@@ -2,6 +2,7 @@
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::WallPoint;
 
 use super::heaps::Heap;
 use super::keys;
@@ -113,7 +114,7 @@ pub(super) fn pieces(
 impl Boulder {
     fn placed(&self, ground: Ground<'_>, feature: u16) -> Placed<Solid> {
         let half = self.size_m.map(|diameter| diameter / 2.0);
-        let (wall, [ny, nz]) = ground.tube.wall_place(self.chainage_m, self.arc_m);
+        let (wall, [ny, nz]) = ground.tube.wall_place(WallPoint { x_m: self.chainage_m, arc_m: self.arc_m });
         let above_m = half[2] * (1.0 - 2.0 * self.sunk);
         let section = ground.frame(self.chainage_m, [wall[0] + above_m * ny, wall[1] + above_m * nz]);
         // Axes of the boulder before its rotation: across the wall, along the wall, and along the tunnel.

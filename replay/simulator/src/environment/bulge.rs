@@ -1,6 +1,7 @@
 //! Wall displaced from the profile, towards the reference point or away from it.
 
 use headrace_geometry::math::{self, PI};
+use headrace_geometry::tunnel::WallPoint;
 
 /// A displaced patch of wall, with the shape of a raised cosine along the tunnel and along the wall.
 ///
@@ -33,14 +34,13 @@ impl Bulge {
         self.chainage_m + self.half_length_m
     }
 
-    /// Displacement of the wall by the patch at a chainage and arc length of a profile with this perimeter, inwards
-    /// positive, m.
-    pub(super) fn displacement_m(&self, chainage_m: f64, arc_m: f64, perimeter_m: f64) -> f64 {
-        let along = (chainage_m - self.chainage_m) / self.half_length_m;
+    /// Displacement of the wall by the patch at a point on a profile with this perimeter, inwards positive, m.
+    pub(super) fn displacement_m(&self, at: WallPoint, perimeter_m: f64) -> f64 {
+        let along = (at.x_m - self.chainage_m) / self.half_length_m;
         if along.abs() >= 1.0 {
             return 0.0;
         }
-        let across = self.off_middle_m(arc_m, perimeter_m) / self.half_width_m;
+        let across = self.off_middle_m(at.arc_m, perimeter_m) / self.half_width_m;
         if across >= 1.0 {
             return 0.0;
         }

@@ -12,7 +12,7 @@
 //! meets rock on the other. A ray therefore cannot escape if profile and mesh do not fit.
 
 use headrace_geometry::math;
-use headrace_geometry::tunnel::{Profile, Yz};
+use headrace_geometry::tunnel::{Profile, WallPoint, Yz};
 
 use super::axis::{Axis, Piece, Station};
 use super::bulge::Bulge;
@@ -173,20 +173,20 @@ impl Tube {
         [fy + (unscaled[0] - fy) * scale, fz + (unscaled[1] - fz) * scale]
     }
 
-    /// Point (y, z) of the wall at `chainage_m` and at `arc_m` of the unscaled profile, and the profile's inward normal
-    /// there. The point includes displacements.
-    pub(super) fn wall_place(&self, chainage_m: f64, arc_m: f64) -> (Yz, Yz) {
+    /// Place (y, z) of a wall point of the unscaled profile, and the profile's inward normal there.
+    ///
+    /// The place includes displacements.
+    pub(super) fn wall_place(&self, at: WallPoint) -> (Yz, Yz) {
         let reference = self.profile.reference();
-        let [wy, wz] = self.profile.point_at(arc_m);
+        let [wy, wz] = self.profile.point_at(at.arc_m);
         let out = [wy - reference[0], wz - reference[1]];
         let normal = self.profile.cast_from_inside(reference, out).map_or([0.0, 1.0], |hit| hit.normal);
-        let radius_m = self.scale(chainage_m) * math::hypot(out[0], out[1]);
+        let radius_m = self.scale(at.x_m) * math::hypot(out[0], out[1]);
         let perimeter_m = self.profile.perimeter_m();
-        let inwards_m: f64 =
-            self.bulges.iter().map(|b| b.displacement_m(chainage_m, arc_m, perimeter_m)).sum();
+        let inwards_m: f64 = self.bulges.iter().map(|b| b.displacement_m(at, perimeter_m)).sum();
         let share = 1.0 - inwards_m / radius_m;
         let place = [reference[0] + share * out[0], reference[1] + share * out[1]];
-        (self.scaled(chainage_m, place), normal)
+        (self.scaled(at.x_m, place), normal)
     }
 
     /// Range along the unit vector `direction` (y, z) from a point of the section at `chainage_m` to the profile's
@@ -251,7 +251,7 @@ impl Tube {
         }
         Face {
             normal: self.falling(stretch, point),
-            feature: self.displaced_by(stretch, chainage_m, hit.arc_m),
+            feature: self.displaced_by(stretch, WallPoint { x_m: chainage_m, arc_m: hit.arc_m }),
         }
     }
 
@@ -368,7 +368,8 @@ impl Tube {
         }
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
-        let inwards_m: f64 = near.map(|bulge| bulge.displacement_m(chainage_m, hit.arc_m, perimeter_m)).sum();
+        let at = WallPoint { x_m: chainage_m, arc_m: hit.arc_m };
+        let inwards_m: f64 = near.map(|bulge| bulge.displacement_m(at, perimeter_m)).sum();
         distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
     }
 
@@ -405,10 +406,10 @@ impl Tube {
     }
 
     /// Number of the feature that displaces the wall most at a point.
-    fn displaced_by(&self, stretch: &Stretch, chainage_m: f64, arc_m: f64) -> Option<u16> {
+    fn displaced_by(&self, stretch: &Stretch, at: WallPoint) -> Option<u16> {
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
-        near.map(|bulge| (bulge.displacement_m(chainage_m, arc_m, perimeter_m).abs(), bulge.feature))
+        near.map(|bulge| (bulge.displacement_m(at, perimeter_m).abs(), bulge.feature))
             .filter(|(by_m, _)| *by_m > FEATURE_M)
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, feature)| feature)

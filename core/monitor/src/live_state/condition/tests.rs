@@ -2,6 +2,7 @@ use super::*;
 use crate::fixtures;
 use crate::live_state::{LiveMetres, SensorState};
 use headrace_geometry::time::MonoNs;
+use headrace_sampling::Target;
 use headrace_sampling::advice::Advice;
 
 const fn at(seconds: u64) -> MonoNs {
@@ -17,7 +18,7 @@ fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
 /// Live state with two heads and another sensor. Their last readings came at 10 s. The speed and its limit
 /// are 0.07 m/s.
 pub(crate) fn state() -> LiveState {
-    let mut heard = LiveState::new(0.5, 2.0, 0b11, 3).heard;
+    let mut heard = LiveState::new(Target::new(0.5), 0b11, 3).heard;
     heard[..3].fill(Some(at(10)));
     LiveState {
         now: at(10),
@@ -30,7 +31,7 @@ pub(crate) fn state() -> LiveState {
         metres: LiveMetres { pass_m: 12.0, open_m: 1.5, ..LiveMetres::default() },
         turning: 0b11,
         heard,
-        ..LiveState::new(0.5, 2.0, 0b11, 3)
+        ..LiveState::new(Target::new(0.5), 0b11, 3)
     }
 }
 
