@@ -3,7 +3,7 @@
 //! Plan, live advice and report use the same functions, so that the planned speed equals the advised speed.
 //! Source: docs/decisions/0005-advice-and-plan.md.
 
-use crate::Target;
+use crate::target::Target;
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 

@@ -50,7 +50,9 @@ impl CoverageConfig {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
-    /// Reads the tables `[coverage]` and `[[openings]]` from the root of a vehicle file. The second value is the confidence of verdicts.
+    /// Reads the tables `[coverage]` and `[[openings]]` from the root of a vehicle file.
+    ///
+    /// The second value is the confidence of verdicts.
     ///
     /// `profile` or `target_m` is `None` if its keys in the file are invalid. The tables are then checked as
     /// far as possible.
