@@ -1,5 +1,8 @@
-//! Relief: places where heads recently found wall that deviates from the design, and votes of the heads on
+//! Relief: places where heads recently found wall that deviates from the design. It also counts votes of the heads on
 //! each other.
+//!
+//! A vote compares two heads that have seen the same bin of the wall. A head that contradicts the design there is
+//! outvoted if another head agrees with the design.
 
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +44,7 @@ pub struct Ballot {
     between_m: Option<[f64; 2]>,
 }
 
-/// Number of votes needed for a decision on a head: about one per bin of a turn.
+/// Number of votes needed to decide whether a head is outvoted: about one per bin of a turn.
 const FULL_BALLOT: u32 = 128;
 
 impl Ballot {
@@ -77,7 +80,7 @@ impl Ballot {
     }
 }
 
-/// The relief of the wall near the vehicle, with the heads' votes.
+/// The relief of the wall near the vehicle, and the votes on each head.
 #[derive(Debug, Clone)]
 pub struct Relief {
     cells: Vec<Cell>,
@@ -115,7 +118,7 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 }
 
 impl Relief {
-    /// Whether earlier returns near this place have the same deviation from the design.
+    /// Whether earlier returns near this return have the same deviation from the design.
     ///
     /// Two limits apply: the reach along the tunnel and the tolerance of the deviation. An earlier wall
     /// return must be within both limits, a doubtful one within half of each.
@@ -144,7 +147,7 @@ impl Relief {
         }
     }
 
-    /// Counts a head's vote in the bin of a return, and updates the votes on other heads there.
+    /// Counts the votes that follow from a head's return: on this head, and on other heads that have seen the same bin.
     pub(super) fn vote(&mut self, head: usize, placed: &PlacedReturn, limits: &WallLimits) {
         let (slab, bin) = place(placed, limits);
         // Returns between half and the whole contradiction limit don't vote, because noise would make heads

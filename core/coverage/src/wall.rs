@@ -168,10 +168,10 @@ impl HeadWall {
         Sorted { waiting, this, distrusted }
     }
 
-    /// Decides on a return and on the waiting returns.
+    /// Classifies a head's new return and the returns that wait for it.
     ///
-    /// `agrees` means that the return agrees with the last one. Returns the run of waiting returns, their
-    /// classification and that of the return.
+    /// `agrees` means that the new return agrees with the head's previous return. Output: the run of waiting
+    /// returns, its classification (`None` if undecided), and the classification of the new return.
     fn decide(
         &mut self,
         placed: &PlacedReturn,

@@ -126,8 +126,8 @@ mod tests {
     /// detection takes.
     #[test]
     fn coarsely_quantised_inertial_unit_at_rest_does_not_count_as_stuck() {
-        // One reading in two hundred differs from the others. So a run of three readings is no evidence, and neither
-        // is one of two thousand.
+        // About one reading in 200 differs from the others, which are equal. Runs of three to 2000 equal readings are
+        // therefore normal, and no evidence that the unit is stuck.
         let coarse = |k: u64| {
             let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
             [step, 0.0, 0.0]

@@ -87,7 +87,8 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
 
 /// Wraps `difference` to [-`modulus`/2, `modulus`/2), the shorter way round. `modulus` must be positive and finite.
 pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
-    // The branches are as in `wrap`. Near half a modulus, rounding matters, so the quotient is used.
+    // As in `wrap`, the branches give the same bits as the formula with the quotient. Near an odd multiple of half the
+    // modulus, rounding can change the result by a modulus, so there the formula decides.
     let size = difference.abs();
     if size < 0.499 * modulus {
         return difference;

@@ -330,7 +330,7 @@ mod tests {
 
     /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
-    fn snapshots_contain_all_state_of_the_world() {
+    fn snapshots_contain_all_state_of_the_adviser() {
         let (_, adviser) = armed().split().unwrap();
         adviser.part.has_state_but_for(&[TypeId::of::<AdviceList>(), TypeId::of::<PlacedTick>()]);
     }

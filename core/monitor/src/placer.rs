@@ -283,7 +283,7 @@ mod tests {
 
     /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
-    fn snapshots_contain_all_state_of_the_world() {
+    fn snapshots_contain_all_state_of_the_placer() {
         let (placer, _) = armed().split().unwrap();
         placer.part.has_state_but_for(&[
             TypeId::of::<Head>(),

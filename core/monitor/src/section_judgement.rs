@@ -57,7 +57,7 @@ impl SectionJudgement {
     /// Reads a judgement from the words of its record; `None` if they are too few, or name an unknown change
     /// or verdict.
     ///
-    /// Earlier versions recorded fewer figures of the cause.
+    /// Records of earlier program versions, with fewer figures about the cause, are accepted.
     pub fn read(words: &[u64]) -> Option<Self> {
         let ([at, index, change, verdict, hole, hole_sd, cause, hole_x, hole_arc], figures) =
             words.split_first_chunk()?;

@@ -200,7 +200,7 @@ mod tests {
 
     /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
-    fn snapshots_contain_all_state_of_the_world() {
+    fn snapshots_contain_all_state_of_the_surveyor() {
         let dive = armed();
         dive.view().surveyor().part.has_state_but_for(&[
             TypeId::of::<Head>(),

@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn heads_that_point_the_same_way_share_a_patch_of_wall() {
-        // Time in which two heads `apart_m` apart along the hull share a patch of wall, s.
+        // Time for which two heads illuminate the same patch of wall, s. `apart_m` is their distance along the hull.
         let shared = |apart_m: f64| {
             let found = found(&[[apart_m, 0.0, 0.0], [0.0, 0.0, 0.1]], HeadLayout::PhaseShift);
             found.iter().map(|exposure| exposure.same_patch_s).sum::<f64>()

@@ -41,8 +41,8 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 ///
 /// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
 /// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth
-/// of the target, and leaves at least three fifths of the distance between passes. With a larger margin, a slower
-/// speed would cost more than it gains.
+/// of the target. With the margin, the allowed distance between passes is at least three fifths of that without
+/// margin. A larger margin would slow the vehicle by more than it is worth.
 pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
     let target_m = target.max_hole_m;
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
@@ -235,8 +235,8 @@ mod tests {
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
         assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
-        // If the distance between samples of a turn nearly reaches the target, the margin leaves three fifths of the
-        // distance between passes.
+        // If the distance between samples of one turn nearly equals the target, the margin reduces the allowed
+        // distance between passes to three fifths of that without margin.
         let sure_m = 0.5 - margin_m(1.0, 0.48);
         assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);
         assert!(margin_m(0.1, 0.5).abs() <= 0.0 && margin_m(0.1, 0.6).abs() <= 0.0);

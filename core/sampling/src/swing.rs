@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_swing_expires_half_a_minute_after_its_end() {
+    fn vehicle_swing_is_forgotten_30_s_after_it_ends() {
         let ended = |t: f64| [if t < 50.0 { 0.1 * math::sin(TAU * t / 10.0) } else { 0.0 }, 0.0];
         let (now, still) = (looks(75.0, ended), looks(90.0, ended));
         assert!(now.0.swing(now.1, 2.0, 0.0).rate_radps > 0.02);

@@ -1,4 +1,4 @@
-//! Scenes for measurements, built from text and the vehicle and scene files built into the program.
+//! Scenes for cost measurements: TOML texts that may name vehicle and scene files embedded in the program.
 
 use headrace_config::Document;
 use headrace_sensor::device::DeviceKind;

@@ -75,7 +75,7 @@ fn signed(value: f64) -> String {
     if value >= 0.0 { format!("{} more", number(value)) } else { format!("{} less", number(-value)) }
 }
 
-/// For each scene, the setting that beats the default, or a statement that the default is on the front.
+/// For each scene whose default is not on the front, a sentence that names a cheaper setting without more error.
 pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
     let mut lines = Vec::new();
     for scene in trade.scenes() {

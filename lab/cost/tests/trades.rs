@@ -120,7 +120,7 @@ fn only_omitted_effects_change_the_result_and_more_rays_reduce_the_change() {
 /// A verdict at a confidence of k standard deviations (sigma) makes the plan aim at a smaller hole, T - k (sigma - 2
 /// mm).
 #[test]
-fn survey_hours_with_confidence_equal_those_with_a_smaller_target() {
+fn survey_hours_at_a_confidence_equal_hours_for_a_reduced_target() {
     let trade = measured(sureness::measure);
     is_whole(&trade);
     let inputs = inputs();

@@ -1,5 +1,5 @@
-//! The table `dives` of a campaign. Each row is a dive's own row, with the dive's path in this place and the facts from
-//! outside the log.
+//! The table `dives` of a campaign. Each row is the row in a dive's own tables, plus the log's path in the campaign's
+//! folder or bucket and facts from outside the log (plant, pilot, day).
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::maker::Made;
 use crate::place::DiveLog;
 
-/// Schema of the table `dives`: the schema of a dive, with plant, pilot and day after the log.
+/// Schema of the table `dives`: the columns of one dive, with `plant`, `pilot` and `day` inserted after `log`.
 pub fn dives_schema() -> SchemaRef {
     let fields = schema("dives").map(|schema| schema.fields().to_vec()).unwrap_or_default();
     let mut all = Vec::new();
@@ -34,8 +34,8 @@ pub fn dives_schema() -> SchemaRef {
     Arc::new(Schema::new(all))
 }
 
-/// Makes the table `dives`. Each row is a dive's own row, with the dive's path in this place and the facts from outside
-/// the log.
+/// Makes the table `dives`. Each row is the row in a dive's own tables, plus the log's path in the campaign's folder or
+/// bucket and facts from outside the log (plant, pilot, day).
 pub(crate) async fn dives_table(dives: &[(DiveLog, Made)], about: &Abouts) -> Result<RecordBatch, Error> {
     let Some(own) = schema("dives") else {
         return Err(DataFusionError::Internal("no dives".to_owned()).into());

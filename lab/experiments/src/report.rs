@@ -33,7 +33,7 @@ pub struct Experiments {
 pub struct Finding {
     /// The paper's statement.
     pub says: &'static str,
-    /// Whether the simulated runs confirm it.
+    /// Whether the simulated runs confirm the paper's statement.
     pub holds: bool,
     /// The simulated result.
     pub evidence: String,

@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn junk_before_a_line_may_resemble_a_winch_number() {
+    fn line_is_decoded_after_junk_that_resembles_a_winch_number() {
         for junk in [&b"12"[..], b"\xFF\0RD,RD", b"03RD,2022-05-14T", b"1234567890"] {
             let got = decode_all(&mut LineCodec::default(), &[junk, PROTOCOL_1].concat());
             assert_eq!(got.len(), 1, "{junk:?}");

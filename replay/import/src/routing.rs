@@ -63,12 +63,12 @@ pub enum RoutingError {
         /// Ids of the sensors in the vehicle file.
         allowed: String,
     },
-    /// No sensor of the vehicle file can receive the data of such a file.
+    /// The vehicle file has no sensor for the data of this kind of log file.
     #[error("the vehicle file has no sensor {which} to receive the data; name one with --source ID={line}")]
     NoTaker {
         /// Description of sensors that could receive the data.
         which: String,
-        /// Form of a line's name in such a file.
+        /// Form of a line's name in this kind of log file.
         line: &'static str,
     },
     /// The file comes from one device, but several sensors could be that device.
@@ -80,7 +80,7 @@ pub enum RoutingError {
         several: String,
         /// Plugin that these sensors have in common.
         plugin: &'static str,
-        /// Form of a line's name in such a file.
+        /// Form of a line's name in this kind of log file.
         line: &'static str,
     },
     /// The file contains values, and there is no vehicle file with sensors that could encode them.
@@ -92,7 +92,7 @@ pub enum RoutingError {
     /// Neither a vehicle file nor an option names a sensor.
     #[error("the sensors of the messages are unknown; give --vehicle VEHICLE.toml or --source ID={line}")]
     NoSensor {
-        /// Form of a line's name in such a file.
+        /// Form of a line's name in this kind of log file.
         line: &'static str,
     },
     /// An option names lines, but the file contains values instead of lines.

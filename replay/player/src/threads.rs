@@ -147,7 +147,8 @@ fn run_tick(dive: &mut Loop, tick: &mut Tick, after_tick: &mut dyn FnMut(&Loop))
     after_tick(dive);
 }
 
-/// Places the pings of a source until it ends, or until the receiver has gone. `unused` returns batches for reuse.
+/// Places the pings of a packet source until the source ends or no receiver takes batches any more. `unused` returns
+/// batches for reuse.
 fn place(
     placer: &mut Placer,
     mut driver: Driver,
@@ -268,7 +269,7 @@ fn drive_all(
     })
 }
 
-/// Runs the remaining steps of a batch's ticks in each loop, with advice for that loop's own target.
+/// For each loop, runs advice (for the loop's own target) and judging of all ticks in a batch of placed pings.
 fn survey_all(dives: &mut [(&mut Loop, &mut Adviser)], batch: &Batch) {
     let mut own = Tick::default();
     for (dive, adviser) in dives {

@@ -130,7 +130,7 @@ fn legs(distances_m: &[f64]) -> Report {
 }
 
 #[test]
-fn wall_beyond_start_and_turning_point_is_open_without_a_flag() {
+fn wall_beyond_start_and_turning_point_has_verdict_open_and_no_flag() {
     let report = legs(&[9.0, -4.0]);
     accounted_for("there and back", &report);
     let front_m = START_M + HEAD_M;

@@ -74,7 +74,7 @@ fn wall_bumps_do_not_bias_the_position() {
 /// During a stop of half a minute before the dive, the program learns the gyro bias. The vehicle then knows its
 /// heading sooner.
 #[test]
-fn initial_stop_gives_earlier_verdicts() {
+fn stop_before_the_dive_leaves_fewer_metres_undecided() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let [at_once, stood] = [Driven::Planned, Driven::Stood].map(|driven| {
         let cell = Cell { vehicle, condition: Condition::DataSheet, start_m: 16.0, let_in_m: None, driven };

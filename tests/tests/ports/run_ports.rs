@@ -256,7 +256,7 @@ fn reports_shorter_than_configured_are_reported() {
 }
 
 #[test]
-fn live_log_has_sent_bytes_and_replays_to_the_same_digest() {
+fn live_log_contains_sent_bytes_and_replays_to_the_same_digest() {
     let folder = Folder::new();
     let (head, counter) = (End::tcp(), End::udp());
     let places = [head.connect().to_string(), counter.connect().to_string()];

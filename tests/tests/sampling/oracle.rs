@@ -260,7 +260,7 @@ fn steps_on_any_wall_match_the_oracle() {
 }
 
 #[test]
-fn tolerances_detect_a_cancelling_subtraction() {
+fn cancellation_in_plain_subtraction_exceeds_the_tolerance() {
     let lost = rows(&["eq6"]).iter().any(|row| {
         let [h, step] = [row.i(1), row.i(2)];
         let m = f64::from(row.count(3));

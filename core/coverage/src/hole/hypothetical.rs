@@ -60,8 +60,8 @@ fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 
 impl HoleFinder {
     /// Lays out the wall with the changes `otherwise` and the additional samples `more`.
     ///
-    /// `more` contains further samples. The layout suffices for circles of up to `radius_m` centred
-    /// between two chainages. Samples of visits from `first_visit` on count.
+    /// The layout suffices for circles of up to `radius_m` centred between two chainages. Stored samples of visits
+    /// before `first_visit` are ignored.
     ///
     /// Allocates: never.
     pub fn lay_otherwise(

@@ -65,10 +65,10 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Loads into the window all samples between two chainages relative to `origin_m`. Cells are about
+    /// Loads into the window the stored samples between two chainages relative to `origin_m`. Cells are about
     /// `cell_m` long.
     ///
-    /// Samples of visits from `first_visit` on count.
+    /// Samples of visits before `first_visit` are ignored.
     ///
     /// Allocates: never.
     pub(super) fn fill(

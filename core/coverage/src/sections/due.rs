@@ -309,10 +309,10 @@ mod tests {
 
     const PERIMETER_M: f64 = 6.0 * core::f64::consts::PI;
 
-    /// Whether a section with one empty circle is certain to fail, in a pipe of 3 m radius.
+    /// Whether a section with one empty circle of radius `circle_m` is certain to fail, in a pipe of 3 m radius.
     ///
-    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw,
-    /// rad. Samples may still land from `to_come_m` on. Up to 9 m, some heads have not been at the wall.
+    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw, rad. New
+    /// samples may land from chainage `to_come_m` on. Some heads have not passed the wall up to 9 m.
     fn fails(circle_m: f64, is_beside: bool, [along_m, yaw_rad]: [f64; 2], to_come_m: f64) -> bool {
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -382,7 +382,8 @@ mod tests {
         for (to_come_m, yaw_rad) in
             [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
         {
-            // At other places on the wall than above the vehicle, the circle would need to be far larger.
+            // A yaw error doesn't move the wall above the vehicle, so a circle of 0.265 m radius suffices there. Beside
+            // the vehicle, it would have to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
         assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in the circle");

@@ -1,4 +1,7 @@
 //! Unpacked samples near the vehicle, in linked lists by cell and by head.
+//!
+//! A brick is a stretch of wall, at least a metre long, that is divided into cells. An open brick holds its samples
+//! unpacked.
 
 use serde::{Deserialize, Serialize};
 
@@ -78,7 +81,7 @@ pub(super) struct OpenBricks {
 stateful!(OpenBricks { state: free, used; lists: nodes; slots: cells, rows_seen, chains, bricks; fixed: rows, columns, most_nodes; });
 
 impl OpenBricks {
-    /// Creates a pool without open bricks. Allocates: at startup only.
+    /// Creates the pool for the samples of up to `slots` open bricks; none is open yet. Allocates: at startup only.
     pub(super) fn new(slots: usize, (rows, columns): (usize, usize), most_nodes: usize) -> Self {
         Self {
             rows,

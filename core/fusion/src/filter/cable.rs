@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn unusual_readings_within_the_gate_start_a_cable_disagreement() {
+    fn readings_unlike_the_inertial_motion_start_a_cable_disagreement_even_within_the_gate() {
         let at_s = disputed_at(1.0, |t, reading| reading.is_usual = t < 4.0).unwrap();
         assert!((at_s - 4.0).abs() < 1e-9, "{at_s}");
     }

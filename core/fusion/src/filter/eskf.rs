@@ -121,7 +121,7 @@ pub struct Eskf {
 stateful!(Eskf { state: at, state, factors, clones, way_sought, slipped_m2, ties, begun, settled, agreement, cable, unrest, slack_level, roughness, seen_again, smoothness, is_at_rest, is_blind, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
-    /// Creates a filter that has buffers, but no estimate yet.
+    /// Creates a filter with allocated buffers and no state estimate yet.
     fn default() -> Self {
         Self {
             at: MonoNs(0),

@@ -34,7 +34,7 @@ impl RepeatedBumps {
 
     /// Returns how often the heads have seen a bump on average, including the present pass; at least 1.
     ///
-    /// In an unfinished turn of a head, half of the bumps have been seen once more than the others.
+    /// A bump is seen once in each started turn. Averaged over a turn, that is the number of turns plus one half.
     fn passes(&self, settings: &Settings) -> f64 {
         (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }

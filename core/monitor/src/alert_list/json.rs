@@ -68,7 +68,7 @@ pub struct ListedAlertJson {
     pub occurrences: Option<u64>,
     /// Chainage of the first occurrence, m.
     pub first_m: Option<f64>,
-    /// Largest deviation among the observation's occurrences, m; 0 for a doubtful setting.
+    /// Largest deviation in any occurrence of this alert, m; 0 in alerts about a doubtful setting.
     pub worst_m: Option<f64>,
     /// Doubtful setting, as judged most recently; `None` for other alerts.
     pub setting: Option<SettingJson>,

@@ -102,7 +102,7 @@ impl Condition {
 }
 
 impl LiveState {
-    /// Whether the spacing T of samples forecast at the present speed exceeds this limit, m, or is unbounded.
+    /// Whether the sample spacing T forecast for the present speed is unbounded or exceeds the limit, m.
     fn turn_exceeds(&self, limit_m: f64) -> bool {
         self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)
     }

@@ -387,7 +387,8 @@ fn reasons(points: &[Point]) -> Vec<String> {
             scenes.push(&point.scene);
         }
     }
-    // Finds the default of a method in a scene, and the setting with the largest number.
+    // Finds the default setting of a method in a scene, and the setting with the largest value: the coarsest ring of
+    // rays, or the longest tick.
     let pair = |scene: &str, method: &str| {
         let of = || points.iter().filter(|point| point.scene == scene && point.method == method);
         let coarsest = of().max_by(|a, b| a.number.unwrap_or(0.0).total_cmp(&b.number.unwrap_or(0.0)))?;

@@ -10,9 +10,9 @@ pub struct Measured {
     pub mode: &'static str,
     /// Number of heads.
     pub heads: u8,
-    /// Spacings in phase shift, or of one continuously turning head.
+    /// Sample spacings of heads in phase shift, or of a single head that turns continuously.
     pub phase_shift: Spacings,
-    /// Spacings in sector offset; `None` for one head.
+    /// Sample spacings of heads in sector offset; `None` for a single head, for which no sectors are offset.
     pub sector_offset: Option<Spacings>,
 }
 

@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn linear_deviation_is_kept_across_the_seam() {
+    fn deviation_linear_in_chainage_is_interpolated_exactly_across_the_seam() {
         let chart = Chart::new(20.0, &lattice(20.0, |x, _| 0.1 * x - 0.3)).unwrap();
         let stretch = Stretch { from_m: 0.0, to_m: 10.0, step_m: 0.07 };
         let compared = chart.compare(&stretch, |x, _| 0.1 * x - 0.3);

@@ -105,7 +105,7 @@ fn split_return_has_the_time_of_its_first_byte() {
 }
 
 #[test]
-fn return_after_a_truncated_one_has_its_own_time() {
+fn return_after_a_truncated_return_is_timed_by_its_own_arrival() {
     let mut decoder = decoder("mode = \"fast\"");
     let whole = bytes(&good());
     assert_eq!(decode(&mut decoder, 100, &whole[..9]), []);
@@ -115,7 +115,7 @@ fn return_after_a_truncated_one_has_its_own_time() {
 }
 
 #[test]
-fn return_after_a_silence_has_its_own_time() {
+fn return_after_a_long_silence_is_timed_by_its_own_arrival() {
     let mut decoder = decoder("mode = \"fast\"");
     assert_eq!(decode(&mut decoder, 100, &bytes(&good())[..5]), []);
     let [(ms, _)] = decode(&mut decoder, 5000, &bytes(&good()))[..] else { panic!() };

@@ -141,8 +141,8 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
-    // After damage the lengths may be arbitrary. A field name begins with a lower-case letter, which rejects most of
-    // them.
+    // In a damaged file the lengths may be arbitrary. Most wrong lengths are detected because no field name, which
+    // begins with a lower-case letter, follows.
     if front.get(8).is_some_and(|byte| !byte.is_ascii_lowercase()) {
         return Err(Stop::Bad);
     }

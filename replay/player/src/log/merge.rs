@@ -12,7 +12,7 @@ use super::fields::{Fields, MessageHead};
 const KEPT: usize = 4;
 const KEPT_BYTES: usize = 3 << 20;
 
-/// A message in the batch of its piece.
+/// A message in a [`Batch`]: its header, its sort rank and its range of bytes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
     pub(super) head: MessageHead,

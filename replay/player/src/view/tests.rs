@@ -123,7 +123,7 @@ fn wall_grid_covers_samples_and_verdicts_near_the_vehicle() {
 }
 
 #[test]
-fn raised_and_cleared_missed_runs_give_one_alert_each() {
+fn missed_stretch_is_announced_once_when_raised_and_once_when_cleared() {
     let mut view = view();
     let run = |change: RunChange| record(RecordKind::Run, &[0, change as u64]);
     let raised = [run(RunChange::Raised), section(1, 40, Judgement::Raised, Verdict::Fail)];

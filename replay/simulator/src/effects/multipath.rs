@@ -130,24 +130,25 @@ mod tests {
         Ray { origin, direction, hit: environment.cast(origin, direction, 100.0) }
     }
 
-    /// If the room is mirrored at each wall that the beam meets, the reflected beam becomes a straight line through
-    /// mirrored rooms.
+    /// If the rectangular tunnel is mirrored at each wall that the beam meets, the reflected beam becomes a straight
+    /// line through the mirrored copies of the tunnel.
     #[test]
-    fn double_reflection_in_a_rectangle_matches_mirrored_rooms() {
+    fn double_reflection_in_a_rectangle_matches_a_straight_beam_through_mirrored_rectangles() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
         let room = Environment::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
             let [dy, dz] = [ray.direction.y(), ray.direction.z()];
-            // Distances along the unfolded beam at which it crosses the side walls, and floor and ceiling.
+            // Distances along the straightened beam at which it crosses the side walls, and floor and ceiling.
             let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
             let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
             let mut crossings =
                 [to_side, to_side + 2.0 * half_width_m / dy.abs(), to_flat, to_flat + height_m / dz.abs()];
             crossings.sort_by(f64::total_cmp);
             let along_m = crossings[1];
-            // The second point at which the wall reflects the beam, folded back into the room.
+            // Second point at which the beam meets the wall: its position on the straightened beam, mirrored back into
+            // the rectangular tunnel.
             let fold = |at: f64, period: f64| {
                 let at = math::wrap(at, 2.0 * period);
                 if at > period { 2.0 * period - at } else { at }

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn head_ranges_are_rounded_in_metres_of_the_device() {
+    fn head_ranges_are_rounded_to_steps_in_device_metres() {
         let mut dive = Dive::with_head();
         dive.vehicle = "[water]\nsound_speed_mps = 1447";
         let water = 1447.0 / 1500.0;
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn echosounder_steps_are_in_metres_of_water() {
+    fn echosounder_ranges_are_rounded_to_steps_in_metres_of_water() {
         let mut dive = Dive::with_sounder();
         dive.trajectory = "place_m = [0.123, 2]";
         assert_lattice(&dive, "[effects.range_quantisation]\nquantum_m = 0.15", 0.15);

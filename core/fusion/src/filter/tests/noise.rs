@@ -96,7 +96,7 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
 /// deviations. Turn rate noise also tilts the force, which the process noise of an epoch neglects. So the unit is
 /// level and only tilts about x, and only its x axis is checked: gravity has no first-order effect there.
 #[test]
-fn white_process_noise_equals_monte_carlo() {
+fn white_process_noise_covariance_equals_monte_carlo() {
     const DRAWS: u32 = 4000;
     let settings = Settings { rate_noise: 0.004, force_noise: 0.02, ..Settings::default() };
     let (_, factors) = leg(&settings, 0.1, still());

@@ -124,7 +124,7 @@ fn stamp_belongs_to_the_first_reading_of_each_kind_after_it() {
 }
 
 #[test]
-fn stamps_sent_after_readings_change_no_times() {
+fn timestamps_sent_after_readings_leave_sample_times_unchanged() {
     let mut times = SampleTimes::new(32, TICK);
     let got = stamped(&mut times, 200, false);
     let right = (0..200).flat_map(|k| [MonoNs(1_000_000_000 + k * 10_000_000); 2]);
