@@ -33,7 +33,7 @@ pub struct Beam<'a> {
 
 /// Evidence on one head from the vehicle's other heads.
 pub(super) struct Others {
-    /// Votes of other heads on this head.
+    /// Votes of other heads on this head, see [`Ballot`].
     pub(super) ballot: Ballot,
     /// Whether another head's range varies when the range to the design varies.
     pub(super) change: bool,
@@ -43,7 +43,7 @@ pub(super) struct Others {
 pub(super) struct Disagreement {
     /// Difference from the previous return, m; `None` if both agree.
     pub(super) jump_m: Option<f64>,
-    /// Number of returns that this return made doubtful.
+    /// Number of earlier, waiting returns that this return made doubtful.
     pub(super) doubtful: u32,
 }
 

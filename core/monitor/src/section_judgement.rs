@@ -13,7 +13,7 @@ pub struct SectionJudgement {
     pub at: MonoNs,
     /// Chainage of the section's start, as a multiple of the section length.
     pub index: i64,
-    /// Change that the judgement made.
+    /// Change of the section's state by the judgement, such as a raised flag.
     pub change: Judgement,
     /// Verdict on the section.
     pub verdict: Verdict,
@@ -162,7 +162,7 @@ mod tests {
         let mut unknown = words.clone();
         unknown[3] = 9;
         assert_eq!(SectionJudgement::read(&unknown), None);
-        // Earlier versions recorded no figure after the swing distance.
+        // Earlier program versions recorded no figure after the swing distance.
         let earlier = SectionJudgement::read(&words[..14]).unwrap().cause.unwrap();
         assert_eq!((earlier.causes, earlier.silent_heads), (Causes::of(Cause::TooFast), HeadSet::default()));
     }

@@ -7,9 +7,10 @@ use crate::target::Target;
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation of a hole's size that requires no margin, m: about that of navigation without error estimates.
+/// Standard deviation of a hole's size up to which no margin is needed, m: about that of navigation without error
+/// estimates.
 const NOTHING_M: f64 = 0.002;
-/// Minimum share of the distance between passes that remains after the margin.
+/// Minimum share of the allowed distance between passes that remains after the margin for position errors.
 ///
 /// No speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;

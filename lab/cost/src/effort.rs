@@ -1,6 +1,6 @@
-//! Amount of measurement: a quick check or the full measurement.
+//! Effort of a cost measurement: a quick check or the full measurement.
 
-/// Amount of measurement.
+/// Effort of a cost measurement: number of seeds, rounds and metres of dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effort {
     /// Under a minute of CPU: one or two seeds, short dives. The result shows that everything works, and gives orders

@@ -35,10 +35,10 @@ pub fn file(name: &str) -> Result<&'static str, CostError> {
     })
 }
 
-/// Inputs of a measurement.
+/// Inputs of a cost measurement.
 #[derive(Clone, Copy)]
 pub struct Inputs<'a> {
-    /// Amount of measurement.
+    /// Effort of the measurement: quick or full.
     pub effort: Effort,
     /// The kinds of devices that vehicle files may name.
     pub kinds: &'a [&'a dyn DeviceKind],

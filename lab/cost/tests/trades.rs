@@ -26,7 +26,7 @@ fn figure(trade: &Trade, [scene, method, value]: [&str; 3], name: &str) -> f64 {
     error.unwrap_or_else(|| panic!("{name} of {scene}, {method}, {value}")).interval.middle
 }
 
-/// Asserts that each line that should have a default has one, and that each trade has advice.
+/// Asserts that a trade has a default setting, finite errors, positive costs, and advice with figures.
 fn is_whole(trade: &Trade) {
     let defaults = trade.points.iter().filter(|point| point.is_default).count();
     assert!(defaults > 0, "{}: no default", trade.name);

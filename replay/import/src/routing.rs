@@ -101,14 +101,14 @@ pub enum RoutingError {
         /// Kind of the file that contains values.
         format: &'static str,
     },
-    /// An option names a line that such a file doesn't have.
+    /// An option names a line that this kind of log file doesn't have.
     #[error("--source {id}={line}: such a file has one line, {only}")]
     NoSuchLine {
         /// Name of the sensor in the option.
         id: String,
         /// Name of the line in the option.
         line: String,
-        /// The only line that such a file has.
+        /// The only line that this kind of log file has.
         only: &'static str,
     },
     /// Two options name the same sensor, which can listen to only one line.

@@ -40,7 +40,7 @@ struct Tick {
 #[derive(Default)]
 struct Batch {
     ticks: Vec<Tick>,
-    /// Number of ticks in use. Further elements are kept for reuse.
+    /// Number of ticks that the batch holds. Further elements of the list are kept for reuse.
     len: usize,
 }
 

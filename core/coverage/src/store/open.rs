@@ -69,7 +69,7 @@ pub(super) struct OpenBricks {
     /// Bitmask of the rows that have samples, for each column of a slot.
     rows_seen: Vec<u32>,
     chains: Vec<[Chain; MAX_HEADS]>,
-    /// Number of the brick in each slot.
+    /// Number of the brick in each slot; `None` for an empty slot.
     bricks: Vec<Option<u32>>,
     nodes: Vec<Node>,
     most_nodes: usize,
@@ -97,7 +97,7 @@ impl OpenBricks {
         }
     }
 
-    /// Number of samples for which there is room.
+    /// Number of samples for which the pool has room.
     pub(super) fn room(&self) -> usize {
         self.most_nodes - self.used
     }

@@ -79,7 +79,7 @@ pub struct CableReading {
     pub agrees: bool,
     /// Whether the reading differs from the inertial motion by no more than usual.
     pub is_usual: bool,
-    /// Whether slack constantly moves the counter by several steps.
+    /// Whether varying cable slack keeps the count changing by several steps.
     pub is_lively: bool,
 }
 

@@ -9,19 +9,19 @@ use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Time constant for forgetting corrections while the count changes, s.
+/// Time constant with which the correction sums decay while the cable count changes, s.
 ///
 /// Corrections are kept for a while, because a counter fails some time before the failure is noticed.
 const RECENT_S: f64 = 1.0;
 /// Minimum time after which an unchanged count means a stop of the vehicle, s. Shorter pauses may come from slow
 /// motion and coarse steps.
 const STANDS_S: f64 = 2.0;
-/// Standard deviation of the length that a stuck wheel may have lost, as a share of the corrections.
+/// Standard deviation of the length that a stuck wheel may have lost, as a share of the summed chainage corrections.
 ///
 /// The wheel is assumed to be stuck in one of ten such cases, so the variance of the lost length is a tenth of the
 /// squared corrections.
 const STUCK_SHARE: f64 = 0.3;
-/// Corrections up to this many predicted standard deviations count as chance.
+/// A sum of corrections up to this many of its predicted standard deviations counts as chance.
 ///
 /// With a limit of 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %.
 /// With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives, instead of 6.

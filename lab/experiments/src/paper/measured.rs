@@ -12,7 +12,7 @@ pub struct Measured {
     pub heads: u8,
     /// Sample spacings of heads in phase shift, or of a single head that turns continuously.
     pub phase_shift: Spacings,
-    /// Sample spacings of heads in sector offset; `None` for a single head, for which no sectors are offset.
+    /// Sample spacings of heads in sector offset; `None` for a run with a single head.
     pub sector_offset: Option<Spacings>,
 }
 

@@ -1,6 +1,6 @@
 //! Merges the messages of several pieces in memory into one order.
 //!
-//! A piece is a chunk, or a run of messages outside chunks.
+//! A piece is a chunk of a log file, or a run of messages outside chunks.
 
 use core::cmp::Reverse;
 use std::collections::BinaryHeap;

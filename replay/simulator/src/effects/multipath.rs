@@ -1,4 +1,4 @@
-//! Echoes by way of two walls.
+//! Multipath: echoes that reach the sonar by way of two walls.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
