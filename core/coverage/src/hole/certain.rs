@@ -1,6 +1,6 @@
 //! Early fail before the hole is final: an empty circle lies wholly where no more samples can land.
 
-use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
+use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 

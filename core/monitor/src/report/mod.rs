@@ -17,7 +17,6 @@ mod inspected;
 mod runs;
 mod sections;
 mod smoothing;
-pub mod smoothing_changes;
 mod sources;
 mod spread;
 mod survey;

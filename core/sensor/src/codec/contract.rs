@@ -5,7 +5,7 @@
 
 use proptest::test_runner::{Config, RngSeed};
 
-use super::Codec;
+use super::interface::Codec;
 
 /// Seed of the contract's random values; arbitrary.
 const SEED: u64 = 881;

@@ -1,8 +1,8 @@
 //! Compares the report of a smoothed dive with the report of the same dive by the filter alone.
 
-use super::sections::SectionReport;
-use super::smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
-use super::{Report, SummaryReport};
+use super::report::{
+    ChangeReport, JudgedReport, MetresReport, Report, SectionReport, SmoothingReport, SummaryReport,
+};
 
 /// Compares the filter's report with the report after smoothing `estimates` estimates in `pieces` contiguous
 /// pieces.
