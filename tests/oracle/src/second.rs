@@ -6,7 +6,7 @@
 
 use super::truth::Truth;
 use super::wall::Wall;
-use crate::TruthError;
+use crate::error::TruthError;
 
 /// Stretches with this half length or less aren't halved again, m.
 const FINEST_M: f64 = 2e-10;

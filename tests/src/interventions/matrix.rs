@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use headrace_coverage::Cause;
 
-use super::{InterventionDive, Right};
+use super::judging::{InterventionDive, Right};
 
 /// Counts of all answers and of right answers.
 #[derive(Debug, Default, Clone, Copy)]

@@ -12,7 +12,7 @@ use headrace_simulator::Simulation;
 use headrace_tests::instrumented::{self, Dive, Sample};
 use headrace_tests::scenes;
 
-use crate::observed;
+use crate::observed::observed;
 
 const VITA: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
 /// A very slow dive in a pipe of 1 m radius.

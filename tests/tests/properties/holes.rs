@@ -3,7 +3,7 @@
 use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
 use headrace_oracle::wall::Wall;
 
-use crate::{Case, few, many};
+use crate::cases::{Case, few, many};
 
 /// Samples that are random, on a lattice, on a line, at one place, coincident, or denser than those of any vehicle.
 fn samples(case: &mut Case, perimeter_m: f64) -> Vec<[f64; 2]> {

@@ -7,7 +7,7 @@ use headrace_sampling::layout::{start_rad, start_reversed_rad};
 use headrace_sampling::section;
 use headrace_sampling::spacing::{self, Spiral};
 
-use crate::{Case, few, many, within};
+use crate::cases::{Case, few, many, within};
 
 /// A random number. It is rarely a sensible argument.
 fn any(case: &mut Case) -> f64 {
